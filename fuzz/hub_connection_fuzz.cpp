@@ -14,6 +14,8 @@
 
 #include "fuzz/support/paced_counts.hpp"
 #include "fuzz/support/shard_world.hpp"
+#include "hub/shard/control_frame.hpp"
+#include "proto/control/ns.hpp"
 #include "proto/frame/frame_builder.hpp"
 
 namespace {
@@ -47,6 +49,9 @@ class PacedWorld final : public fuzzing::ShardWorld {
     counts_.begin_epoch(terms_.window);
     counts_.allow_repeats(sequence_);
   }
+  void on_answer(const Node& node) override {
+    if (node.id == node_[1].id) counts_.begin_epoch(terms_.window);
+  }
 
   // ---- the paced group: the conductor's part
 
@@ -63,7 +68,7 @@ class PacedWorld final : public fuzzing::ShardWorld {
         change_terms(input.byte());
         break;
       case 2:
-        end_pace(false);
+        end_pace();
         break;
       case 3:
         credit(input.byte());
@@ -81,8 +86,8 @@ class PacedWorld final : public fuzzing::ShardWorld {
   void begin_group(std::uint8_t how) {
     if (paced_index_ != 0) {
       static_cast<void>(groups_.exchange(paced_index_, nullptr));
-      end_pace(true);
-      shard_->send(ForgetRetainedCommand{paced_group()});
+      end_pace();
+      shard_->send(ForgetRetainedCommand{paced_group(), node_[0].id});
       // No frame of it may be under way to a table that does not know it.
       turn();
     }
@@ -109,11 +114,24 @@ class PacedWorld final : public fuzzing::ShardWorld {
 
   void begin_pace() {
     // The last one may be the last one that it had.
-    if (!subscribed_) counts_.allow_repeats(sequence_);
-    if (!subscribed_) publish_members(true);
+    const bool begins = !subscribed_;
+    if (begins) counts_.allow_repeats(sequence_);
+    if (begins) publish_members(true);
     counts_.set_window(terms_.window);
-    shard_->send(PaceCommand{node_[1].session, paced_group(), terms_, retain_});
+    shard_->send(PaceCommand{node_[1].session, paced_group(), terms_, retain_, false, number_});
+    if (begins) answer();
     turn();
+  }
+
+  /// The counts begin with it.
+  void answer() {
+    SendControlCommand command;
+    command.session = node_[1].session;
+    command.frame = control_frame(proto::Kind::ns, node_[1].id, fuzzing::kHub,
+                                  proto::encode_answer(proto::ns::SubscribeAnswer{}, 1));
+    command.answers = 1;
+    command.counts = CountsBegin{paced_group(), ++number_};
+    shard_->send(std::move(command));
   }
 
   void change_terms(std::uint8_t how) {
@@ -122,11 +140,11 @@ class PacedWorld final : public fuzzing::ShardWorld {
     begin_pace();
   }
 
-  void end_pace(bool group_gone) {
+  void end_pace() {
     if (!subscribed_) return;
-    if (!group_gone) publish_members(false);
+    publish_members(false);
     subscribed_ = false;
-    shard_->send(EndPaceCommand{node_[1].session, paced_group(), group_gone});
+    shard_->send(EndPaceCommand{node_[1].session, paced_group()});
     turn();
   }
 
@@ -179,7 +197,8 @@ class PacedWorld final : public fuzzing::ShardWorld {
     if (!node_[1].welcomed) return;
     if (messages == 255) counts_.lied();
     const std::uint64_t total = counts_.credit(messages);
-    flow(node_[1], proto::flow::Credit{paced_group(), total + (messages == 255 ? 1'000 : 0)});
+    flow(node_[1],
+         proto::flow::Credit{paced_group(), total + (messages == 255 ? 1'000 : 0), number_});
   }
 
   // ---- in the end
@@ -245,7 +264,7 @@ class PacedWorld final : public fuzzing::ShardWorld {
 
   void check_retained() {
     settle(true);
-    end_pace(false);
+    end_pace();
     publish(0);
     settle(true);
     const std::uint64_t before = counts_.ended();
@@ -260,6 +279,7 @@ class PacedWorld final : public fuzzing::ShardWorld {
   PaceTerms terms_;
   bool retain_ = false;
   bool subscribed_ = false;
+  std::uint8_t number_ = 0;  ///< of its counts
   fuzz::PacedCounts counts_;
   std::deque<std::vector<std::byte>> pieces_;  ///< of the message that is being written
   std::uint64_t sequence_ = 0;

@@ -58,7 +58,7 @@ class Witness final : public InboundHost {
   }
   [[nodiscard]] bool on_service_moved(const proto::ns::ServiceMoved& event) override {
     note("moved " + event.name);
-    return !event.again;
+    return event.provider != NodeId{};
   }
   bool on_watch_events(const proto::ns::WatchEvents& events) override {
     note("watched " + std::to_string(events.watch));

@@ -121,6 +121,8 @@ class ShardWorld {
   virtual void on_group_frame(const proto::FrameView&) {}
   /// The counts of the node's data frames begin at 0.
   virtual void on_new_epoch(const Node&) {}
+  /// An answer came to the node.
+  virtual void on_answer(const Node&) {}
 
   void attach(Node& node, bool new_session) {
     if (!new_session) read(node);
@@ -201,6 +203,7 @@ class ShardWorld {
         if (!welcome->resumed) on_new_epoch(node);
         node.hub_epoch = welcome->epoch;
       }
+      if (header.kind == proto::Kind::ns) on_answer(node);
       return;
     }
     ++node.taken;

@@ -376,17 +376,14 @@ typedef enum nif_incoming_type {
   NIF_DISCONNECTED = 4,
   /** Another connection took the session over; nothing follows [text]. */
   NIF_SESSION_REPLACED = 5,
-  /** A node subscribed to a service of this one [group, from: the node, count: subscribers now].
-   * Once for each service, with from 0, when it was declared again after a break: some may have
-   * come or gone meanwhile. */
-  NIF_SUBSCRIBER_JOINED = 6,
-  /** ... and left again [same]. */
-  NIF_SUBSCRIBER_LEFT = 7,
-  /** A service that this node subscribed appeared, came under another group id, or went [text: full
-   * name, former_group (0: none), group (0: withdrawn, or after a refusal taken again, there being
-   * none; with a reason, nif_status: the hub refused the subscription after a break, payload: its
-   * words), message_type, instance, delivery, direction]. Comes before the first message of the new
-   * group, also after a break; messages of former groups may still come. */
+  /** How many subscribers a service of this node has now [group, count]: whenever some came or
+   * went, and once when it was declared again after a break. */
+  NIF_SUBSCRIBERS = 6,
+  /** What a service that this node subscribed is now: it appeared, has another provider or group
+   * id, or went [text: full name, group (0: none; with a reason, nif_status: the hub refused the
+   * subscription after a break, payload: its words), from: its provider (0: nobody), count: the
+   * provider's session, message_type, instance, delivery, direction]. Comes before the first
+   * message of another group, also after a break; messages of former groups may still come. */
   NIF_SERVICE_MOVED = 8,
   /** An own service got another group id after a reconnect [text: service name, former_group, group
    * (0: the hub refused it; reason: nif_status; payload: its words)]. Send to the new id from now
@@ -432,14 +429,14 @@ typedef struct nif_incoming {
   const void* extensions; /**< EXT as on the wire, without its leading u16; NULL: none. */
   size_t extensions_size;
   int64_t arrival_ns; /**< When it was read from the socket, ns since 1970. */
-  uint64_t count;     /**< Frames of a NIF_REPORT, messages or frames of a NIF_GAP, subscribers;
-                         NIF_COUNT_UNKNOWN. */
+  uint64_t count;     /**< Frames of a NIF_REPORT, messages or frames of a NIF_GAP, subscribers, the
+                         session of a NIF_SERVICE_MOVED; NIF_COUNT_UNKNOWN. */
   /** nif_drop_reason of a NIF_REPORT and a NIF_GAP, the GOODBYE code (docs/protocol.md, section 3)
    * of a NIF_DISCONNECTED, nif_status of a NIF_SERVICE_MOVED, a NIF_OWN_SERVICE_MOVED and a
    * NIF_WATCHED; else 0. */
   uint32_t reason;
   uint32_t group;        /**< Group id; 0: none. */
-  uint32_t former_group; /**< Group id; 0: none. */
+  uint32_t former_group; /**< Of a NIF_OWN_SERVICE_MOVED; 0: none. */
   uint32_t message_type; /**< As its provider advertised it. */
   uint32_t instance;     /**< The same. */
   uint32_t delivery;     /**< nif_delivery. */

@@ -137,6 +137,8 @@ typedef struct nif_subscription {
   /** nif_direction. NIF_ACCEPTS: nothing will come, since the service takes data; this tells where
    * it is, for who sends to it (NIF_SERVICE). */
   uint32_t direction;
+  uint32_t provider; /**< Node id; 0: nobody provides it at the moment. */
+  uint64_t session;  /**< Of the provider: tells one program from the next under that id. */
 } nif_subscription;
 
 /** How much of a service a subscriber wants. Members that are 0 ask for nothing. */

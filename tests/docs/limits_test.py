@@ -80,11 +80,9 @@ class Tables(unittest.TestCase):
                             ("parts of a name, and of a pattern", "kNamePartsMax"),
                             ("bytes of a session token", "kTokenBytesMax"),
                             ("bytes of a description", "kDescriptionBytesMax"), ("bytes of metadata", "kMetadataBytesMax"),
-                            ("bytes of the proof of a group", "kGroupProofBytesMax"),
                             ("bytes of a sentence", "kSentenceBytesMax"),
                             ("bytes of KICK's reason, LOG_LEVEL's level and the words of other answers", "kRemarkBytesMax"),
-                            ("bytes of a message in fragments", "kMessageBytesMax"),
-                            ("groups in between in a SERVICE_MOVED (key 12)", "kGroupsBetweenMax")):
+                            ("bytes of a message in fragments", "kMessageBytesMax")):
             self.assertEqual(said.pop(words), str(constant(name)), words)
         self.assertEqual(list(said), ["what"], "of which the source is not named here")
 

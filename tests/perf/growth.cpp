@@ -234,7 +234,7 @@ Work subscribers(std::size_t count) {
     for (std::size_t i = 0; i < count; ++i) {
       // In no order: a step that shares no factor with the number of them.
       const NodeIndex node = world->subscribers[1 + i * 7'919 % count];
-      if (services.unsubscribe(node, "robot/odom", world->effects)) wrong("it had subscribed");
+      if (services.unsubscribe(node, "robot/odom", {}, world->effects)) wrong("it had subscribed");
       if (!world->publisher.publish_member(GroupIndex{1}, node, world->membership))
         wrong("the group is there");
       if (!services.subscribe(node, "robot/odom", {}, world->effects))

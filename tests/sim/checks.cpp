@@ -13,36 +13,6 @@ namespace {
 /// A conductor that pauses may be so late.
 constexpr milliseconds kLate{3'000};
 
-template <class Event>
-DueEvent told_change(const proto::Payload& payload, std::uint32_t to) {
-  const auto event = proto::decode<Event>(payload);
-  if (!event) broken(Checker::events, "an event cannot be read: " + event.error().sentence);
-  DueEvent told;
-  told.to = to;
-  told.operation = Event::kOperation;
-  told.old_group = index_of(event->group);
-  told.node = index_of(event->node);
-  told.subscribers = event->subscribers;
-  return told;
-}
-
-DueEvent told_moved(const proto::Payload& payload, std::uint32_t to) {
-  const auto event = proto::decode<ns::ServiceMoved>(payload);
-  if (!event) broken(Checker::events, "an event cannot be read: " + event.error().sentence);
-  DueEvent told;
-  told.to = to;
-  told.operation = ns::ServiceMoved::kOperation;
-  told.name = event->name;
-  told.old_group = index_of(event->old_group);
-  told.new_group = index_of(event->new_group);
-  told.message_type = event->message_type;
-  told.delivery = event->delivery;
-  told.window = event->window;
-  told.retain = event->retain;
-  told.direction = event->direction;
-  return told;
-}
-
 bool changes_groups(std::uint16_t answer) {
   return answer == ns::AdvertiseAnswer::kOperation || answer == ns::WithdrawAnswer::kOperation ||
          answer == ns::SubscribeAnswer::kOperation || answer == ns::UnsubscribeAnswer::kOperation;
@@ -50,13 +20,8 @@ bool changes_groups(std::uint16_t answer) {
 
 std::string text_of(const DueEvent& event) {
   const bool moved = event.operation == ns::ServiceMoved::kOperation;
-  return "to node " + std::to_string(event.to) + ": " +
-         (moved ? "SERVICE_MOVED '" + event.name + "' from group " +
-                      std::to_string(event.old_group) + " to " + std::to_string(event.new_group)
-                : (event.operation == ns::SubscriberJoined::kOperation ? "SUBSCRIBER_JOINED "
-                                                                       : "SUBSCRIBER_LEFT ") +
-                      std::to_string(event.node) + " of group " + std::to_string(event.old_group) +
-                      ", now " + std::to_string(event.subscribers));
+  return "to node " + std::to_string(event.to) + ": " + (moved ? "SERVICE_MOVED" : "SUBSCRIBERS") +
+         " of '" + event.name + "'";
 }
 
 }  // namespace
@@ -131,62 +96,53 @@ void Checks::events() {
     const std::uint32_t to = index_of(NodeId{proto::load_header(control->frame.data()).dst});
     const std::uint16_t operation = proto::split_control(payload)->header.operation;
     if (operation == ns::ServiceMoved::kOperation) {
-      told.push_back(told_moved(payload, to));
-    } else if (operation == ns::SubscriberJoined::kOperation) {
-      told.push_back(told_change<ns::SubscriberJoined>(payload, to));
-    } else if (operation == ns::SubscriberLeft::kOperation) {
-      told.push_back(told_change<ns::SubscriberLeft>(payload, to));
+      told.push_back({to, operation, told_moved(payload, to)});
+    } else if (operation == ns::Subscribers::kOperation) {
+      told.push_back({to, operation, told_subscribers(payload)});
     }
   }
-  const Model::Renumbered renumbered = model_.take_renumbered();
-  for (const auto& [former, present] : renumbered) {
+  for (const auto& [former, present] : model_.take_renumbered()) {
     if (auto place = places_.extract(former); !place.empty()) {
       place.key() = present;
       places_.insert(std::move(place));
     }
   }
-  counts(told, renumbered);
-  // Two who leave in one step may be told in any order: then the numbers are in the order of the
-  // telling.
-  const auto without_numbers = [](std::vector<DueEvent> list) {
-    for (DueEvent& event : list) event.subscribers = 0;
-    std::sort(list.begin(), list.end());
-    return list;
-  };
-  const std::vector<DueEvent> due = without_numbers(model_.take_due());
-  const std::vector<DueEvent> plain = without_numbers(told);
+  std::sort(told.begin(), told.end());
+  told.erase(std::unique(told.begin(), told.end()), told.end());
+  const std::vector<DueEvent> due = model_.take_due();
   for (const DueEvent& event : due) {
-    if (!std::binary_search(plain.begin(), plain.end(), event))
+    if (!std::binary_search(told.begin(), told.end(), event))
       broken(Checker::events, "not told " + text_of(event));
   }
-  for (const DueEvent& event : plain) {
+  for (const DueEvent& event : told) {
     if (!std::binary_search(due.begin(), due.end(), event))
       broken(Checker::events, "told for nothing " + text_of(event));
   }
-  require(due.size() == plain.size(), Checker::events, "something is told twice");
 }
 
-void Checks::counts(const std::vector<DueEvent>& told, const Model::Renumbered& renumbered) const {
-  const auto has_moved = [&](std::uint32_t node) {
-    return std::any_of(renumbered.begin(), renumbered.end(),
-                       [node](const auto& one) { return one.first == node || one.second == node; });
-  };
-  // From the last one, which says how many there are, back to the first.
-  std::map<std::uint32_t, std::uint32_t> numbers;
-  for (auto event = told.rbegin(); event != told.rend(); ++event) {
-    if (event->operation == ns::ServiceMoved::kOperation) continue;
-    const auto group = model_.groups().find(event->old_group);
-    const std::size_t now = group == model_.groups().end()
-                                ? event->subscribers
-                                : group->second->second.subscribers.size();
-    std::uint32_t& number =
-        numbers.try_emplace(event->old_group, static_cast<std::uint32_t>(now)).first->second;
-    if (event->subscribers != number)
-      broken(Checker::events, "a wrong number of subscribers " + text_of(*event));
-    if (has_moved(event->node))
-      continue;  // comes under one id as it goes under the other: they are as many as before
-    number = event->operation == ns::SubscriberJoined::kOperation ? number - 1 : number + 1;
-  }
+/// An event tells the present state. Returns the service's name.
+std::string Checks::told_moved(const proto::Payload& payload, std::uint32_t to) const {
+  auto event = proto::decode<ns::ServiceMoved>(payload);
+  if (!event) broken(Checker::events, "an event cannot be read: " + event.error().sentence);
+  const Model::Topic* topic = model_.topic(event->name);
+  require(topic != nullptr && topic->subscribers.contains(to), Checker::events,
+          "a node is told of a service that it did not subscribe to");
+  require((event->session != 0) == (event->provider != NodeId{}), Checker::events,
+          "SERVICE_MOVED names a provider without its session, or the reverse");
+  event->session = 0;  // the hub's own number
+  if (static_cast<const ns::ServiceState&>(*event) != model_.state_of(*topic, to))
+    broken(Checker::events, "SERVICE_MOVED tells of '" + event->name + "' what is not so");
+  return event->name;
+}
+
+std::string Checks::told_subscribers(const proto::Payload& payload) const {
+  const auto event = proto::decode<ns::Subscribers>(payload);
+  if (!event) broken(Checker::events, "an event cannot be read: " + event.error().sentence);
+  const auto group = model_.groups().find(index_of(event->group));
+  require(group != model_.groups().end(), Checker::events, "SUBSCRIBERS is of no service");
+  require(event->subscribers == group->second->second.subscribers.size(), Checker::events,
+          "SUBSCRIBERS tells a wrong number");
+  return group->second->first;
 }
 
 void Checks::sessions() const {
@@ -294,9 +250,9 @@ void Checks::group_table() {
   }
   const auto gone = [this](std::uint32_t group) {
     const hub::GroupMembers* members = subject_.groups.find(group);
-    if (members != nullptr && !members->ends() && !model_.groups().contains(group)) {
+    if (members != nullptr && !model_.groups().contains(group)) {
       broken(Checker::group_table,
-             "the table has group " + std::to_string(group) + ", which nobody provides");
+             "the table has group " + std::to_string(group) + ", which stands for nothing");
     }
   };
   for (const std::uint32_t group : touched_) gone(group);

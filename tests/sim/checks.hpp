@@ -33,8 +33,8 @@ class Checks {
 
  private:
   void events();
-  /// The numbers in what providers were told.
-  void counts(const std::vector<DueEvent>& told, const Model::Renumbered& renumbered) const;
+  [[nodiscard]] std::string told_moved(const proto::Payload& payload, std::uint32_t to) const;
+  [[nodiscard]] std::string told_subscribers(const proto::Payload& payload) const;
   void sessions() const;
   void names() const;
   void node_table() const;

@@ -23,7 +23,6 @@ void Checks::paces() {
     }
   }
   for (const std::uint32_t group : touched_) {
-    // Of a group that is gone they end when its last frames were delivered.
     const auto found = model_.groups().find(group);
     if (found != model_.groups().end()) pace_of(group, found->second->second);
   }

@@ -261,6 +261,9 @@ void Model::stood_still(milliseconds time, milliseconds now) {
       census_.add(Happening::grace_put_off);
     put_off(session.declare_until);
   }
+  for (auto& [full_name, topic] : topics_) {
+    if (topic.unused_until) put_off(*topic.unused_until);
+  }
   put_off(past_.returns_until);
 }
 
@@ -283,11 +286,12 @@ void Model::ticked(milliseconds now) {
     sessions_.at(index).declares = false;
     if (sessions_.at(index).connected) drop_undeclared(index, now);
   }
+  give_back_unused(now);
 }
 
 void Model::end(std::uint32_t index, milliseconds now) {
   const Session session = sessions_.at(index);
-  for (const auto& [full_name, life] : session.subscribes) unsubscribe(index, full_name);
+  for (const auto& [full_name, life] : session.subscribes) unsubscribe(index, full_name, now);
   for (const auto& [full_name, life] : session.provides) withdraw(full_name, now);
   names_.erase(session.name);
   generations_.erase(index);
@@ -320,6 +324,9 @@ std::optional<milliseconds> Model::next_deadline() const {
     if (session.connected && session.declares && (!next || session.declare_until < *next))
       next = session.declare_until;
   }
+  for (const auto& [full_name, topic] : topics_) {
+    if (topic.unused_until && (!next || *topic.unused_until < *next)) next = topic.unused_until;
+  }
   return next;
 }
 
@@ -346,17 +353,29 @@ bool Model::subscribes(std::uint32_t index, std::uint32_t group) const {
   return found != groups_.end() && found->second->second.subscribers.contains(present(index));
 }
 
+std::size_t Model::provided() const {
+  return static_cast<std::size_t>(
+      std::count_if(groups_.begin(), groups_.end(),
+                    [](const auto& entry) { return entry.second->second.service->provided(); }));
+}
+
 std::vector<DueEvent> Model::take_due() {
   std::vector<DueEvent> due;
-  for (DueEvent& event : due_) {
-    const auto found = sessions_.find(event.to);
-    if (found == sessions_.end() || !found->second.connected) {
-      census_.add(Happening::event_skipped_away);
-    } else {
-      due.push_back(std::move(event));
-    }
+  const auto tell = [&](std::uint32_t to, std::uint16_t operation, const std::string& name) {
+    if (sessions_.at(to).connected) return due.push_back({to, operation, name});
+    census_.add(Happening::event_skipped_away);
+  };
+  for (const std::string& name : std::exchange(moved_services_, {})) {
+    const Topic* moved = topic(name);
+    if (moved == nullptr) continue;
+    for (const auto& [subscriber, asked] : moved->subscribers)
+      tell(subscriber, proto::ns::ServiceMoved::kOperation, name);
   }
-  due_.clear();
+  for (const std::string& name : std::exchange(resubscribed_, {})) {
+    const Service* provided = service(name);
+    if (provided != nullptr && provided->provided())
+      tell(provided->provider, proto::ns::Subscribers::kOperation, name);
+  }
   std::sort(due.begin(), due.end());
   return due;
 }

@@ -24,20 +24,11 @@ namespace gimnet::sim {
 
 using std::chrono::milliseconds;
 
-/// What somebody has to be told.
+/// What somebody has to be told: the present state of that service.
 struct DueEvent {
   std::uint32_t to = 0;  ///< node index
   std::uint16_t operation = 0;
-  std::string name;             ///< SERVICE_MOVED: full name
-  std::uint32_t old_group = 0;  ///< or the group of SUBSCRIBER_...
-  std::uint32_t new_group = 0;
-  std::uint32_t message_type = 0;
-  proto::ns::Delivery delivery{};
-  std::uint32_t window = 0;  ///< in force
-  bool retain = false;
-  proto::ns::Direction direction{};
-  std::uint32_t node = 0;         ///< SUBSCRIBER_...: who
-  std::uint32_t subscribers = 0;  ///< SUBSCRIBER_...: now
+  std::string name;  ///< full name of the service
   friend auto operator<=>(const DueEvent&, const DueEvent&) = default;
 };
 
@@ -71,22 +62,12 @@ struct GivenIds {
   [[nodiscard]] bool few_left() const { return kEveryIndex - 1 - old < 1'000; }
 };
 
-/// A proof that a service had a group, as the hub gave it out.
-struct GivenProof {
-  std::vector<std::byte> proof;
-  std::string full_name;
-  std::uint64_t forgettings = 0;  ///< of groups, until then
-};
-
 /// What outlives the hub: tokens that nodes hold, and the indices that it must not give to
 /// newcomers any more.
 struct Past {
   std::map<std::vector<std::byte>, GivenToken> tokens;
   GivenIds nodes;
-  GivenIds groups;
-  std::map<std::uint32_t, std::vector<GivenProof>> proofs;  ///< by group index
-  std::uint64_t group_forgettings = 0;
-  hub::IndexSet groups_outlasting;  ///< in use at the last one
+  std::set<std::uint32_t> groups;  ///< of the life before
   std::vector<Kicked> kicked;
   std::uint64_t token_numbers = 0;  ///< given so far
   milliseconds returns_until{};     ///< nodes of the past may come back under their ids
@@ -135,13 +116,15 @@ class Model final : public Witness {
     std::uint32_t group = 0;
     std::uint32_t provider = 0;
     proto::ns::Advertise terms;
-    std::uint64_t stream = 0;  ///< of all, never given twice: groups are
+    std::uint64_t stream = 0;  ///< of all, never given twice; 0: nobody provides it
+    [[nodiscard]] bool provided() const { return provider != 0; }
   };
   /// What a subscriber wants of a service at most; 0: without a bound.
   struct Terms {
     std::uint32_t window = 0;
     std::uint32_t depth = 1;
     std::uint32_t interval_us = 0;
+    std::uint8_t number = 0;  ///< of its counts
     friend bool operator==(const Terms&, const Terms&) = default;
   };
   struct Subscriber {
@@ -151,15 +134,19 @@ class Model final : public Witness {
     bool once_paced =
         false;  ///< it was paced and wants no bound any more: it stays so, without one
   };
-  /// A full name that somebody provides or waits for.
+  /// A full name that somebody provides or waits for, or that still has a group.
   struct Topic {
     std::optional<Service> service;
+    std::optional<milliseconds> unused_until;  ///< nobody does: its group is given back then
     std::map<std::uint32_t, Subscriber> subscribers;
   };
   /// n of sync(n); 0: a service without.
   [[nodiscard]] static std::uint32_t window_of(const proto::ns::Advertise& terms);
   /// What the hub owes that subscriber; nothing: all that comes.
   [[nodiscard]] static std::optional<Terms> pace_of(const Topic& topic, std::uint32_t subscriber);
+  /// What that subscriber is told of a service, but for the provider's session.
+  [[nodiscard]] proto::ns::ServiceState state_of(const Topic& topic,
+                                                 std::uint32_t subscriber) const;
   using Topics = std::map<std::string, Topic>;
 
   // What the conductor was told, and what it made of it
@@ -199,7 +186,7 @@ class Model final : public Witness {
 
   /// Does the hub know the connection by which this came?
   [[nodiscard]] const Session* known(const hub::SessionRef& session, NodeId node) const;
-  /// What had to be told in this step; those who are not connected are told nothing.
+  /// What has to be told of this step, each once; those who are not connected are told nothing.
   [[nodiscard]] std::vector<DueEvent> take_due();
 
   [[nodiscard]] const std::map<std::uint32_t, Session>& sessions() const { return sessions_; }
@@ -214,6 +201,7 @@ class Model final : public Witness {
   [[nodiscard]] const std::map<std::uint32_t, const Topics::value_type*>& groups() const {
     return groups_;
   }
+  [[nodiscard]] std::size_t provided() const;
   /// Group and node indices that were ever given out, in this order.
   [[nodiscard]] const std::vector<std::uint32_t>& groups_given() const { return groups_given_; }
   [[nodiscard]] const std::vector<std::uint32_t>& nodes_given() const { return nodes_given_; }
@@ -262,15 +250,6 @@ class Model final : public Witness {
   void take_new_index(std::uint32_t index, milliseconds now);
   /// `granted`: that was kept before.
   void give_node(std::uint32_t index, bool granted);
-  void keep_forgettings(const hub::HubState& state, milliseconds now);
-  void give_proof(std::uint32_t group, const std::string& full_name,
-                  const std::vector<std::byte>& proof);
-  /// Does the proof count that says so?
-  [[nodiscard]] bool counts(std::uint32_t group, const GivenProof& proof) const;
-  [[nodiscard]] bool is_proven(const std::string& full_name,
-                               const proto::ns::Advertise& terms) const;
-  /// Can any service prove that the group is its own?
-  [[nodiscard]] bool is_somebodys(std::uint32_t group) const;
   [[nodiscard]] bool rests(const std::map<std::uint32_t, milliseconds>& resting,
                            std::uint32_t index, milliseconds now) const;
   void take_name(std::uint32_t index, const std::string& name, milliseconds now);
@@ -281,11 +260,11 @@ class Model final : public Witness {
   [[nodiscard]] std::size_t subscribers(const std::string& full_name) const;
   [[nodiscard]] const Service* service(const std::string& full_name) const;
   void forget_if_unused(const std::string& full_name);
+  void note_if_unused(const std::string& full_name, milliseconds now);
+  void give_back_unused(milliseconds now);
+  void leave_group(const std::string& full_name, milliseconds now);
   void withdraw(const std::string& full_name, milliseconds now);
-  void unsubscribe(std::uint32_t index, const std::string& full_name);
-  void tell_moved(const std::string& full_name, std::uint32_t old_group, std::uint32_t new_group,
-                  const proto::ns::Advertise& terms);
-  void tell_provider(const std::string& full_name, std::uint32_t subscriber, bool joined);
+  void unsubscribe(std::uint32_t index, const std::string& full_name, milliseconds now);
 
   // Requests; each checks the answer
   struct Asked {
@@ -326,6 +305,7 @@ class Model final : public Witness {
   [[nodiscard]] bool terms_fit(const proto::ns::Subscribe& wanted) const;
   void change_terms(Topic& topic, std::uint32_t subscriber, const Terms& terms);
   void judge_subscribe_answer(const Asked& asked, const Topic& topic);
+  void take_over(const Asked& asked, const std::string& full_name, Topic& topic);
   void open_group(const Asked& asked, const std::string& full_name, std::uint32_t group,
                   const proto::ns::Advertise& terms);
   void judge_withdraw(const Asked& asked);
@@ -365,14 +345,11 @@ class Model final : public Witness {
       unkept_;                   ///< indices that were not granted, given while nothing can be kept
   bool keeping_failed_ = false;  ///< in this step
   bool few_nodes_left_ = false;  ///< when the last step was over: newcomers may be refused
-  bool few_groups_left_ = false;
   std::set<std::uint32_t> forgotten_nodes_;  ///< given in this life, and not kept as used any more
-  std::set<std::uint32_t> forgotten_groups_;
-  std::uint64_t forgettings_ = 0;  ///< of groups, when the last step was over
-  hub::IndexSet outlasting_;
   Renumbered renumbered_;
   std::optional<hub::Limits> configuration_;
-  std::vector<DueEvent> due_;
+  std::set<std::string> moved_services_;  ///< that changed, and whose subscribers are told
+  std::set<std::string> resubscribed_;    ///< whose providers are told
   std::uint64_t orders_ = 0;
   std::uint64_t streams_ = 0;
   bool drain_wanted_ = false;

@@ -107,16 +107,12 @@ void Model::renumber(std::uint32_t index, std::uint32_t to, milliseconds now) {
   for (const auto& [full_name, life] : session.provides) {
     topics_.at(full_name).service->provider = to;
     touched_.insert(topics_.at(full_name).service->group);
+    moved_services_.insert(full_name);
   }
   for (const auto& [full_name, life] : session.subscribes) {
     auto subscriber = topics_.at(full_name).subscribers.extract(index);
     subscriber.key() = to;
     topics_.at(full_name).subscribers.insert(std::move(subscriber));
-    if (const Service* provided = service(full_name);
-        provided != nullptr && provided->provider == to)
-      continue;
-    tell_provider(full_name, to, true);
-    tell_provider(full_name, index, false);
   }
   rest(resting_ids_, index, now);
   give_node(to, true);  // or the hub had refused it

@@ -52,11 +52,13 @@ void Model::judge_subscribe(const Asked& asked) {
   }
   const double rate = wanted->rate_hz;
   const Terms terms{wanted->window, wanted->depth,
-                    rate == 0.0 ? 0 : static_cast<std::uint32_t>(std::ceil(1e6 / rate))};
+                    rate == 0.0 ? 0 : static_cast<std::uint32_t>(std::ceil(1e6 / rate)),
+                    wanted->number};
   Session& session = asked.session;
   const bool fresh = !session.subscribes.contains(wanted->name);
-  const bool said_before =
-      !fresh && topics_.at(wanted->name).subscribers.at(asked.index).terms == terms;
+  Terms repeated = fresh ? Terms{} : topics_.at(wanted->name).subscribers.at(asked.index).terms;
+  repeated.number = terms.number;
+  const bool said_before = !fresh && repeated == terms;
   if (!said_before && !may_declare(asked, Happening::subscriptions_rate)) {
     return require_status(asked, Status::rate, Checker::limits);
   }
@@ -71,7 +73,8 @@ void Model::judge_subscribe(const Asked& asked) {
   Topic& topic = topics_[wanted->name];
   if (fresh) {
     topic.subscribers[asked.index].terms = terms;
-    tell_provider(wanted->name, asked.index, true);
+    topic.unused_until.reset();
+    resubscribed_.insert(wanted->name);
   } else {
     change_terms(topic, asked.index, terms);
   }
@@ -95,24 +98,32 @@ void Model::change_terms(Topic& topic, std::uint32_t index, const Terms& terms) 
 }
 
 void Model::judge_subscribe_answer(const Asked& asked, const Topic& topic) {
-  const auto answer = proto::decode_answer<ns::SubscribeAnswer>(asked.answer);
+  auto answer = proto::decode_answer<ns::SubscribeAnswer>(asked.answer);
   ns::SubscribeAnswer due;
-  if (topic.service) {
-    const ns::Advertise& terms = topic.service->terms;
-    due.group = group_id(topic.service->group);
-    due.message_type = terms.message_type;
-    due.instance = terms.instance;
-    due.delivery = terms.delivery;
-    due.retain = terms.retain;
-    due.direction = terms.direction;
-    if (const auto pace = pace_of(topic, asked.index)) due.window = pace->window;
-  }
+  static_cast<ns::ServiceState&>(due) = state_of(topic, asked.index);
+  due.number = topic.subscribers.at(asked.index).terms.number;
+  if (answer) answer->session = 0;  // the hub's own number
   require(answer.has_value() && answer->group == due.group, Checker::answers,
           "SUBSCRIBE is answered with a wrong group");
   require(answer->window == due.window, Checker::pace,
           "SUBSCRIBE is answered with another window than is in force");
   require(*answer == due, Checker::answers,
           "SUBSCRIBE is answered with other terms than the provider's");
+}
+
+ns::ServiceState Model::state_of(const Topic& topic, std::uint32_t subscriber) const {
+  ns::ServiceState state;
+  if (!topic.service) return state;
+  const ns::Advertise& terms = topic.service->terms;
+  state.group = group_id(topic.service->group);
+  if (topic.service->provided()) state.provider = id(topic.service->provider);
+  state.message_type = terms.message_type;
+  state.instance = terms.instance;
+  state.delivery = terms.delivery;
+  state.retain = terms.retain;
+  state.direction = terms.direction;
+  if (const auto pace = pace_of(topic, subscriber)) state.window = pace->window;
+  return state;
 }
 
 void Model::judge_unsubscribe(const Asked& asked) {
@@ -122,7 +133,7 @@ void Model::judge_unsubscribe(const Asked& asked) {
     return require_status(asked, Status::not_found, Checker::answers);
   }
   require_status(asked, Status::done, Checker::answers);
-  unsubscribe(asked.index, wanted->name);
+  unsubscribe(asked.index, wanted->name, asked.now);
 }
 
 }  // namespace gimnet::sim

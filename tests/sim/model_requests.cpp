@@ -129,7 +129,7 @@ void Model::judge_control(const Asked& asked, std::uint16_t operation) {
     case ctrl::HubInfo::kOperation: {
       require_status(asked, Status::done, Checker::answers);
       const auto answer = proto::decode_answer<ctrl::HubInfoAnswer>(asked.answer);
-      return require(answer->nodes == sessions_.size() && answer->services == groups_.size(),
+      return require(answer->nodes == sessions_.size() && answer->services == provided(),
                      Checker::answers, "HUB_INFO counts wrongly");
     }
     case ctrl::Statistics::kOperation:
@@ -208,6 +208,7 @@ void Model::judge_service_list(const Asked& asked) {
        entry != groups_.end() && entry->first <= last; ++entry) {
     const auto& [full_name, topic] = *entry->second;
     const Service& service = *topic.service;
+    if (!service.provided()) continue;
     if (!wanted->pattern.empty() && !proto::matches(wanted->pattern, full_name)) continue;
     require(record != answer->services.end(), Checker::answers, "SERVICES leaves out a service");
     require(record->group == group_id(entry->first) && record->name == full_name &&

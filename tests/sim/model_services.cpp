@@ -48,56 +48,51 @@ void Model::forget_if_unused(const std::string& full_name) {
   if (!found->second.service && found->second.subscribers.empty()) topics_.erase(found);
 }
 
-void Model::tell_moved(const std::string& full_name, std::uint32_t old_group,
-                       std::uint32_t new_group, const ns::Advertise& terms) {
-  const Topic& topic = topics_.at(full_name);
-  for (const auto& [subscriber, asked] : topic.subscribers) {
-    DueEvent event;
-    event.to = subscriber;
-    event.operation = ns::ServiceMoved::kOperation;
-    event.name = full_name;
-    event.old_group = old_group;
-    event.new_group = new_group;
-    event.message_type = terms.message_type;
-    event.delivery = terms.delivery;
-    event.retain = terms.retain;
-    event.direction = terms.direction;
-    if (const auto pace = new_group != 0 ? pace_of(topic, subscriber) : std::nullopt)
-      event.window = pace->window;
-    due_.push_back(std::move(event));
+void Model::note_if_unused(const std::string& full_name, milliseconds now) {
+  Topic& topic = topics_.at(full_name);
+  if (!topic.service || topic.service->provided() || !topic.subscribers.empty()) return;
+  topic.unused_until = now + milliseconds{limits_.grace_ms};
+}
+
+void Model::give_back_unused(milliseconds now) {
+  std::vector<std::string> over;
+  for (const auto& [full_name, topic] : topics_) {
+    if (topic.unused_until && *topic.unused_until <= now) over.push_back(full_name);
+  }
+  for (const std::string& full_name : over) {
+    census_.add(Happening::group_given_back);
+    leave_group(full_name, now);
+    topics_.erase(full_name);
   }
 }
 
-void Model::tell_provider(const std::string& full_name, std::uint32_t subscriber, bool joined) {
-  const Service* provided = service(full_name);
-  if (provided == nullptr) return;
-  DueEvent event;
-  event.to = provided->provider;
-  event.operation = joined ? ns::SubscriberJoined::kOperation : ns::SubscriberLeft::kOperation;
-  event.old_group = provided->group;
-  event.node = subscriber;
-  due_.push_back(std::move(event));
+void Model::leave_group(const std::string& full_name, milliseconds now) {
+  Topic& topic = topics_.at(full_name);
+  const std::uint32_t group = topic.service->group;
+  topic.service.reset();
+  groups_.erase(group);
+  touched_.insert(group);
+  rest(resting_groups_, group, now);
 }
 
 void Model::withdraw(const std::string& full_name, milliseconds now) {
   Topic& entry = topics_.at(full_name);
-  const Service old = *entry.service;
-  entry.service.reset();
-  groups_.erase(old.group);
-  touched_.insert(old.group);
-  rest(resting_groups_, old.group, now);
-  sessions_.at(old.provider).provides.erase(full_name);
+  sessions_.at(entry.service->provider).provides.erase(full_name);
+  entry.service->provider = 0;
+  entry.service->stream = 0;
+  touched_.insert(entry.service->group);
   if (!entry.subscribers.empty()) census_.add(Happening::service_withdrawn);
-  tell_moved(full_name, old.group, 0, old.terms);
-  forget_if_unused(full_name);
+  moved_services_.insert(full_name);
+  note_if_unused(full_name, now);
 }
 
-void Model::unsubscribe(std::uint32_t index, const std::string& full_name) {
+void Model::unsubscribe(std::uint32_t index, const std::string& full_name, milliseconds now) {
   Topic& topic = topics_.at(full_name);
   topic.subscribers.erase(index);
   if (topic.service) touched_.insert(topic.service->group);
   sessions_.at(index).subscribes.erase(full_name);
-  tell_provider(full_name, index, false);
+  resubscribed_.insert(full_name);
+  note_if_unused(full_name, now);
   forget_if_unused(full_name);
 }
 
@@ -106,7 +101,7 @@ void Model::drop_undeclared(std::uint32_t index, milliseconds now) {
   for (const auto& [full_name, life] : session.subscribes) {
     if (life == session.life) continue;
     census_.add(Happening::undeclared_dropped);
-    unsubscribe(index, full_name);
+    unsubscribe(index, full_name, now);
   }
   for (const auto& [full_name, life] : session.provides) {
     if (life == session.life) continue;
@@ -128,7 +123,8 @@ void Model::judge_advertise(const Asked& asked) {
     census_.add(Happening::delivery_refused);
     return require_status(asked, status, Checker::limits);
   }
-  const Service* known = service(full_name);
+  const Service* standing = service(full_name);
+  const Service* known = standing != nullptr && standing->provided() ? standing : nullptr;
   const bool said_before =
       known != nullptr && known->provider == asked.index && same_terms(known->terms, *offer);
   if (!said_before && !may_declare(asked, Happening::services_rate))
@@ -139,66 +135,51 @@ void Model::judge_advertise(const Asked& asked) {
     census_.add(Happening::services_limit);
     return require_status(asked, Status::limit, Checker::limits);
   }
-  const bool needs_group = known == nullptr || !same_stream(known->terms, *offer);
-  const bool refused =
-      proto::read_status(proto::split_control(asked.answer)->body).status == Status::limit;
-  if (needs_group && refused && few_groups_left_) {
-    if (known != nullptr) session.provides[full_name] = session.life;
-    return census_.add(Happening::waits_for_returns);
-  }
+  const bool needs_group = standing == nullptr || !same_stream(standing->terms, *offer);
   require_status(asked, Status::done, Checker::limits);
   const auto answer = proto::decode_answer<ns::AdvertiseAnswer>(asked.answer);
   require(answer.has_value() && answer->subscribers == subscribers(full_name), Checker::answers,
           "ADVERTISE is answered with a wrong number of subscribers");
   session.provides[full_name] = session.life;
-  if (needs_group) open_group(asked, full_name, index_of(answer->group), *offer);
-  give_proof(index_of(answer->group), full_name, answer->proof);
-  if (needs_group) return;
-  require(index_of(answer->group) == known->group, Checker::answers,
-          "a service that is advertised again changes its group");
-  topics_.at(full_name).service->terms = *offer;
+  const std::uint32_t group = index_of(answer->group);
+  if (needs_group) return open_group(asked, full_name, group, *offer);
+  require(group == standing->group, Checker::answers,
+          "a service with the same terms changes its group");
+  Topic& topic = topics_.at(full_name);
+  if (known == nullptr) take_over(asked, full_name, topic);
+  topic.service->terms = *offer;
+}
+
+void Model::take_over(const Asked& asked, const std::string& full_name, Topic& topic) {
+  topic.service->provider = asked.index;
+  topic.service->stream = ++streams_;
+  topic.unused_until.reset();
+  touched_.insert(topic.service->group);
+  moved_services_.insert(full_name);
+  if (!topic.subscribers.empty()) census_.add(Happening::provider_changed);
 }
 
 void Model::open_group(const Asked& asked, const std::string& full_name, std::uint32_t group,
                        const ns::Advertise& terms) {
-  const auto free = [&](std::uint32_t index) {
-    return index != 0 && !groups_.contains(index) && !rests(resting_groups_, index, asked.now);
-  };
-  const std::uint32_t former = index_of(terms.former_group);
-  const bool claims = service(full_name) == nullptr && free(former);
-  if (claims && is_proven(full_name, terms)) {
-    census_.add(Happening::former_group_kept);
-    require(group == former, Checker::answers,
-            "a service that came back does not get its former group");
-  } else {
-    if (claims) census_.add(Happening::former_group_unproven);
-    require(!past_.groups.contains(group), Checker::ids,
-            "a new service gets a group given out before the restart");
-    require(!is_somebodys(group), Checker::ids,
-            "a new service gets a group that another one can prove to have had");
-  }
+  require(!past_.groups.contains(group), Checker::ids,
+          "a new service gets a group given out before the restart");
   require(!groups_.contains(group), Checker::ids, "a service gets the group of another one");
   require(!rests(resting_groups_, group, asked.now), Checker::ids,
           "a service gets a group that rests");
   const auto entry = topics_.try_emplace(full_name).first;
-  const std::uint32_t old_group = entry->second.service ? entry->second.service->group : 0;
-  if (old_group != 0) {
-    groups_.erase(old_group);
-    touched_.insert(old_group);
-    rest(resting_groups_, old_group, asked.now);
-  }
-  if (!entry->second.subscribers.empty()) {
-    census_.add(old_group != 0 ? Happening::service_moved : Happening::subscribed_before_service);
-  }
-  entry->second.service = Service{group, asked.index, terms, ++streams_};
-  for (auto& [index, subscriber] : entry->second.subscribers)
+  Topic& topic = entry->second;
+  if (!topic.subscribers.empty())
+    census_.add(topic.service ? Happening::service_moved : Happening::subscribed_before_service);
+  if (topic.service) leave_group(full_name, asked.now);
+  topic.unused_until.reset();
+  topic.service = Service{group, asked.index, terms, ++streams_};
+  for (auto& [index, subscriber] : topic.subscribers)
     subscriber.once_plain = subscriber.once_paced = false;
   count_delivery(terms, census_);
   touched_.insert(group);
   groups_[group] = &*entry;
   groups_given_.push_back(group);
-  forgotten_groups_.erase(group);
-  tell_moved(full_name, old_group, group, terms);
+  moved_services_.insert(full_name);
 }
 
 void Model::judge_withdraw(const Asked& asked) {
@@ -207,7 +188,8 @@ void Model::judge_withdraw(const Asked& asked) {
   const HubId owner = hub_of(wanted->group);
   const auto found =
       owner == hub_ || owner == kOwnHub ? groups_.find(index_of(wanted->group)) : groups_.end();
-  if (found == groups_.end()) return require_status(asked, Status::not_found, Checker::answers);
+  if (found == groups_.end() || !found->second->second.service->provided())
+    return require_status(asked, Status::not_found, Checker::answers);
   const auto& [full_name, entry] = *found->second;
   if (entry.service->provider != asked.index)
     return require_status(asked, Status::denied, Checker::answers);

@@ -280,7 +280,6 @@ void SimNode::hears(const WirePointer& wire, const Bytes& frame) {
             "a node gets a control frame for another one");
     return on_control(from, payload);
   }
-  if (header.kind == Kind::flow) return on_ping(from, frame);
   on_data(from, header, frame);
 }
 
@@ -362,12 +361,7 @@ void SimNode::declare_again() {
   for (const auto& [service, what] : provided) {
     if (faulty() && around_.setting.random.chance(100)) continue;
     if (registered_.empty()) continue;
-    ns::Advertise offer = what.offer;
-    offer.former_group = what.group;
-    offer.former_proof = what.proof;
-    if (faulty() && around_.setting.random.chance(around_.setting.plan.bad_proof))
-      spoil_proof(offer);
-    ask(offer, about(service, offer));
+    ask(what.offer, about(service, what.offer));
   }
   for (const auto& [full_name, before] : subscribed) {
     if (faulty() && around_.setting.random.chance(100)) {
@@ -375,7 +369,7 @@ void SimNode::declare_again() {
       continue;
     }
     if (link().same_session && !unsubscribing_.contains(full_name))
-      link().before[full_name] = before.group;
+      link().before[full_name] = before.known;
     subscribe(before.wanted);
   }
   unsubscribing_.clear();

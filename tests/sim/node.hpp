@@ -50,14 +50,19 @@ class SimNode {
   struct Provided {
     proto::ns::Advertise offer;
     GroupId group;
-    std::vector<std::byte> proof{};  ///< that the service has the group
   };
   [[nodiscard]] const std::map<std::string, Provided>& provides() const {
     return provides_;
   }  ///< by service
+  /// Where a service is.
+  struct Known {
+    GroupId group;    ///< 0: none
+    NodeId provider;  ///< 0: nobody
+    friend bool operator==(const Known&, const Known&) = default;
+  };
   struct Subscribed {
     proto::ns::Subscribe wanted;
-    GroupId group;  ///< 0 while nobody provides it
+    Known known;
   };
   [[nodiscard]] const std::map<std::string, Subscribed>& subscribes() const {
     return subscribes_;
@@ -73,12 +78,14 @@ class SimNode {
     std::string subject;
     proto::ns::Advertise offer;
     proto::ns::Subscribe wanted;
+    GroupId group{};  ///< of a WITHDRAW
   };
   [[nodiscard]] static Open about(std::string subject, proto::ns::Advertise offer = {}) {
-    return {{}, 0, std::move(subject), std::move(offer), {}};
+    return {{}, 0, std::move(subject), std::move(offer), {}, {}};
   }
   /// What came of a group by one connection.
   struct Taken {
+    std::optional<std::uint8_t> number;  ///< of the counts; nothing: none begun
     std::uint64_t messages = 0;
     std::uint64_t credited = 0;
     std::uint64_t last = 0;         ///< number of the last message
@@ -96,8 +103,8 @@ class SimNode {
     std::map<std::uint16_t, Open> open;    ///< by request number
     std::map<std::uint32_t, Taken> taken;  ///< by group
     std::set<std::uint32_t> gone;  ///< groups that ended: what still comes of them counts no more
-    std::map<std::string, GroupId> moved;  ///< where services are, by events of this connection
-    std::map<std::string, GroupId>
+    std::map<std::string, Known> moved;  ///< by events of this connection
+    std::map<std::string, Known>
         before;  ///< of those that it declares again: where it knew them to be
     bool same_session =
         false;  ///< as its last connection, and no other was dialled in vain between
@@ -113,7 +120,6 @@ class SimNode {
   void dial();
   [[nodiscard]] proto::Hello hello(hub::Identity& identity);
   void spoil_token(proto::Hello& hello, hub::Identity& identity);
-  void spoil_proof(proto::ns::Advertise& offer);
   bool break_something();
   void fall(bool unseen);
   void hang();
@@ -161,15 +167,13 @@ class SimNode {
   void on_answer(const Open& asked, std::span<const std::byte> payload);
   void on_event(Link& from, std::uint16_t operation, std::span<const std::byte> payload);
   void on_data(Link& from, const proto::FrameHeader& header, const Bytes& frame);
-  /// What the hub asks to be told: that it was read.
-  void on_ping(Link& from, const Bytes& frame);
   void on_service_moved(Link& from, std::span<const std::byte> payload);
-  void require_told(const Link& from, const std::string& full_name, GroupId group) const;
+  void require_told(const Link& from, const std::string& full_name, const Known& known) const;
   /// It may have subscribed to something on that connection and not know it.
   [[nodiscard]] static bool subscribes_now(const Link& link);
   void on_subscribed(const Open& asked, const proto::ns::SubscribeAnswer& answer);
-  void know_window(Link& link, const std::string& full_name, GroupId group, std::uint32_t window,
-                   bool retained);
+  void know_window(Link& link, const std::string& full_name, const proto::ns::ServiceState& state,
+                   std::uint8_t number);
   void take_message(Link& from, GroupId group, std::uint64_t message);
   void credit(Link& from, GroupId group);
   void credit_later(Link& from, GroupId group);
@@ -194,6 +198,7 @@ class SimNode {
   std::map<std::string, Subscribed> subscribes_;
   std::set<std::string> unsubscribing_;  ///< asked to, not answered: the hub may have ended it
   std::map<std::string, std::set<std::uint32_t>> windows_asked_;  ///< ever, by full name
+  std::uint8_t next_number_ = 0;                                  ///< of counts
   std::uint64_t session_ = 0;  ///< the latest, by the reference model
   std::uint64_t dials_ = 0;    ///< since its last WELCOME
   // Of its connection

@@ -22,30 +22,11 @@ void SimNode::advertise(const std::string& service, bool anew) {
   if (service == "s3" || service == "s7") offer.direction = ns::Direction::accepts;
   const auto known = provides_.find(service);
   if (known != provides_.end()) offer = known->second.offer;
-  offer.former_group = GroupId{};
-  offer.former_proof.clear();
-  if (faulty() && around_.setting.random.chance(around_.setting.plan.bad_proof)) spoil_proof(offer);
   if (anew) offer.message_type = static_cast<std::uint32_t>(around_.setting.random.below(4));
   offer.metadata = around_.setting.random.chance(500) ? "about it" : "";
   if (anew || known == provides_.end()) draw_delivery(offer);
   if (!registered_.empty()) tell_others(registered_ + "/" + service);
   ask(offer, about(service, offer));
-}
-
-/// It claims the group of another service, or cannot prove that it had the one that it claims.
-void SimNode::spoil_proof(ns::Advertise& offer) {
-  Random& random = around_.setting.random;
-  for (const auto& [full_name, subscribed] : subscribes_) {
-    if (subscribed.group == GroupId{} || random.chance(500)) continue;
-    offer.former_group = subscribed.group;
-    break;
-  }
-  if (offer.former_proof.empty() || random.chance(500)) {
-    offer.former_proof.assign(random.below(3) * 8, std::byte{0x5A});
-  } else {
-    const std::uint64_t bit = random.below(8 * offer.former_proof.size());
-    offer.former_proof[bit / 8] ^= std::byte{1} << (bit % 8);
-  }
 }
 
 /// So that somebody subscribes to it: sometimes in the place of another one.
@@ -120,52 +101,46 @@ ns::Subscribe SimNode::some_subscription(const std::string& full_name) {
   return wanted;
 }
 
+/// One that begins has counts of its own; one that is changed keeps them.
 void SimNode::subscribe(const ns::Subscribe& wanted) {
   windows_asked_[wanted.name].insert(wanted.window);
   Open open = about(wanted.name);
   open.wanted = wanted;
-  ask(wanted, std::move(open));
-}
-
-void SimNode::on_ping(Link& from, const Bytes& frame) {
-  const auto message = proto::flow::decode(std::span{frame}.subspan(proto::kHeaderSize));
-  const auto* ping = message ? std::get_if<proto::flow::Ping>(&*message) : nullptr;
-  require(ping != nullptr, Checker::seam, "a shard said something of FLOW that is no PING");
-  if (from.wire != wire_) return;  // it has replaced this one itself
-  std::array<std::byte, proto::flow::kSizeMax> bytes{};
-  const std::size_t size = proto::flow::encode(proto::flow::Pong{ping->sequence, 0, 0}, bytes);
-  send(proto::Kind::flow, 0, std::span{bytes}.first(size));
+  const auto standing = subscribes_.find(wanted.name);
+  const bool begins = standing == subscribes_.end() || unsubscribing_.contains(wanted.name);
+  open.wanted.number = begins ? next_number_++ : standing->second.wanted.number;
+  const ns::Subscribe request = open.wanted;
+  ask(request, std::move(open));
 }
 
 void SimNode::on_service_moved(Link& from, std::span<const std::byte> payload) {
   const auto event = proto::decode<ns::ServiceMoved>(payload);
   require(event.has_value(), Checker::events, "SERVICE_MOVED cannot be read");
-  for (const GroupId group : event->between) {
-    known_groups_.insert(group.value());
-    from.gone.insert(group.value());
-  }
-  known_groups_.insert(event->new_group.value());
-  from.moved[event->name] = event->new_group;
+  known_groups_.insert(event->group.value());
+  const Known now{event->group, event->provider};
+  from.moved[event->name] = now;
   const auto subscribed = subscribes_.find(event->name);
-  if (subscribed != subscribes_.end()) subscribed->second.group = event->new_group;
-  if (event->old_group != event->new_group) {
-    from.taken.erase(event->old_group.value());
-    from.gone.insert(event->old_group.value());
+  if (subscribed == subscribes_.end()) return;
+  const GroupId former = std::exchange(subscribed->second.known, now).group;
+  if (former != event->group) {
+    from.taken.erase(former.value());
+    from.gone.insert(former.value());
   }
-  if (event->new_group != GroupId{})
-    know_window(from, event->name, event->new_group, event->window, event->retain);
+  if (event->group != GroupId{})
+    know_window(from, event->name, *event, subscribed->second.wanted.number);
 }
 
 /// What an answer says of a service, an event said before: on this connection, or, where nothing
 /// changed, on the last.
-void SimNode::require_told(const Link& from, const std::string& full_name, GroupId group) const {
+void SimNode::require_told(const Link& from, const std::string& full_name,
+                           const Known& known) const {
   const auto before = from.before.find(full_name);
   if (before == from.before.end()) return;
   // Declared so late that it may have ended as undeclared, and begun anew.
   const std::chrono::milliseconds grace{around_.setting.plan.limits.grace_ms};
   if (around_.setting.agenda.now() - from.dialled >= grace) return;
   const auto moved = from.moved.find(full_name);
-  if (group == (moved != from.moved.end() ? moved->second : before->second)) return;
+  if (known == (moved != from.moved.end() ? moved->second : before->second)) return;
   broken(Checker::told, "program " + std::to_string(number_) +
                             " came back, and was not told where '" + full_name +
                             "' is now before it asked");
@@ -178,29 +153,33 @@ bool SimNode::subscribes_now(const Link& link) {
 }
 
 void SimNode::on_subscribed(const Open& asked, const ns::SubscribeAnswer& answer) {
-  require_told(link(), asked.subject, answer.group);
-  subscribes_[asked.subject] = {asked.wanted, answer.group};
+  const Known known{answer.group, answer.provider};
+  require_told(link(), asked.subject, known);
+  require(answer.number == asked.wanted.number, Checker::answers,
+          "SUBSCRIBE is answered with another count number");
+  subscribes_[asked.subject] = {asked.wanted, known};
   known_groups_.insert(answer.group.value());
-  if (answer.group != GroupId{})
-    know_window(link(), asked.subject, answer.group, answer.window, answer.retain);
+  if (answer.group != GroupId{}) know_window(link(), asked.subject, answer, answer.number);
 }
 
-void SimNode::know_window(Link& link, const std::string& full_name, GroupId group,
-                          std::uint32_t window, bool retained) {
-  Taken& taken = link.taken[group.value()];
-  link.gone.erase(group.value());
-  taken.window = window;
-  taken.retained = retained;
-  if (window == 0) return;
+void SimNode::know_window(Link& link, const std::string& full_name, const ns::ServiceState& state,
+                          std::uint8_t number) {
+  Taken& taken = link.taken[state.group.value()];
+  link.gone.erase(state.group.value());
+  if (taken.number != number) taken.messages = taken.credited = 0;
+  taken.number = number;
+  taken.window = state.window;
+  taken.retained = state.retain;
+  if (state.window == 0) return;
   // Who asked for several may have had any of them in force since; 0 is what the provider offers,
   // which may be the most.
-  std::uint32_t most = window;
+  std::uint32_t most = state.window;
   const std::set<std::uint32_t>& asked = windows_asked_[full_name];
   if (asked.size() > 1) most = std::max(most, *asked.rbegin());
   if (asked.size() > 1 && asked.contains(0))
     most = static_cast<std::uint32_t>(around_.setting.plan.limits.sync_window);
   taken.window_most = std::max(taken.window_most, most);
-  if (taken.messages > taken.credited) credit_later(link, group);
+  if (taken.messages > taken.credited) credit_later(link, state.group);
 }
 
 void SimNode::take_message(Link& from, GroupId group, std::uint64_t message) {
@@ -212,6 +191,7 @@ void SimNode::take_message(Link& from, GroupId group, std::uint64_t message) {
   require(message > taken.last || (again && (taken.retained || taken.window_most == 0)), minds,
           "a subscriber gets an older message after a newer one");
   taken.last = message;
+  if (!taken.number) return;  // its SUBSCRIBE is not answered yet
   ++taken.messages;
   const bool asks = std::any_of(from.open.begin(), from.open.end(), [](const auto& entry) {
     return entry.second.operation == ns::Subscribe::kOperation;
@@ -239,7 +219,8 @@ void SimNode::credit(Link& from, GroupId group) {
     return;
   taken.credited = taken.messages;
   std::array<std::byte, proto::flow::kSizeMax> bytes{};
-  const std::size_t size = proto::flow::encode(proto::flow::Credit{group, taken.messages}, bytes);
+  const std::size_t size = proto::flow::encode(
+      proto::flow::Credit{group, taken.messages, taken.number.value_or(0)}, bytes);
   send(proto::Kind::flow, 0, std::span{bytes}.first(size));
 }
 

@@ -98,9 +98,9 @@ void SimNode::change_services(std::uint64_t choice) {
   }
   if (choice == 63) {
     const auto group = make_id<GroupId>(hub_of(id_), static_cast<std::uint32_t>(which + 1));
-    ns::Advertise perhaps_own;
-    perhaps_own.former_group = group;
-    return ask(ns::Withdraw{group}, about("", perhaps_own));
+    Open perhaps_own = about("");
+    perhaps_own.group = group;
+    return ask(ns::Withdraw{group}, std::move(perhaps_own));
   }
   ns::Advertise wrong;
   wrong.service = "not/one/part";
@@ -120,11 +120,11 @@ void SimNode::send_something() {
     return publish(entry->second);
   }
   for (const auto& [full_name, subscribed] : subscribes_) {
-    if (subscribed.group == GroupId{}) continue;
+    if (subscribed.known.group == GroupId{}) continue;
     // Only the provider may send to its subscribers; everybody may send to the provider, if its
     // service takes data.
     const bool legal = random.chance(700);
-    return send_message(legal ? Kind::service : Kind::group, subscribed.group.value());
+    return send_message(legal ? Kind::service : Kind::group, subscribed.known.group.value());
   }
 }
 
@@ -163,13 +163,13 @@ void SimNode::on_answer(const Open& asked, std::span<const std::byte> payload) {
     case ns::Advertise::kOperation:
       if (done) {
         const auto answer = proto::decode_answer<ns::AdvertiseAnswer>(payload);
-        provides_[asked.subject] = {asked.offer, answer->group, answer->proof};
+        provides_[asked.subject] = {asked.offer, answer->group};
       }
       break;
     case ns::Withdraw::kOperation:
       if (done) {
         std::erase_if(provides_, [&asked](const auto& entry) {
-          return entry.first == asked.subject || entry.second.group == asked.offer.former_group;
+          return entry.first == asked.subject || entry.second.group == asked.group;
         });
       }
       break;
@@ -194,10 +194,9 @@ void SimNode::on_event(Link& from, std::uint16_t operation, std::span<const std:
     if (wire_ != nullptr && &from == &link()) on_watch_events(payload);
   } else if (operation == ns::ServiceMoved::kOperation) {
     on_service_moved(from, payload);
-  } else if (operation == ns::SubscriberJoined::kOperation) {
-    const auto event = proto::decode<ns::SubscriberJoined>(payload);
-    require(event.has_value(), Checker::events, "SUBSCRIBER_JOINED cannot be read");
-    learn(event->node);
+  } else if (operation == ns::Subscribers::kOperation) {
+    require(proto::decode<ns::Subscribers>(payload).has_value(), Checker::events,
+            "SUBSCRIBERS cannot be read");
   }
 }
 

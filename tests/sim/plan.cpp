@@ -94,7 +94,6 @@ Plan Plan::draw(Random& random, std::size_t nodes) {
   plan.disk_full = sometimes(random, 500);
   plan.hub_kills = random.chance(300) ? random.between(1, 2) : 0;
   plan.hub_drains = random.chance(200) ? random.between(1, 2) : 0;
-  plan.bad_proof = sometimes(random, 300);
   return plan;
 }
 

@@ -36,9 +36,7 @@ struct Plan {
   std::uint64_t administers = 0;  ///< of an administrator's acts
   std::uint64_t flood = 0;
   // Thousandths of other occasions
-  std::uint64_t bad_token = 0;  ///< of HELLOs
-  std::uint64_t bad_proof =
-      0;  ///< of ADVERTISEs: a former group that is another's, or is not proven
+  std::uint64_t bad_token = 0;          ///< of HELLOs
   std::uint64_t lost_token = 0;         ///< of crashes
   std::uint64_t rename = 0;             ///< of HELLOs
   std::uint64_t slow_reader = 0;        ///< of nodes
@@ -77,7 +75,6 @@ inline constexpr std::array<Fault, 28> kFaults = {{
     {"administers", &Plan::administers},
     {"flood", &Plan::flood},
     {"bad_token", &Plan::bad_token},
-    {"bad_proof", &Plan::bad_proof},
     {"lost_token", &Plan::lost_token},
     {"rename", &Plan::rename},
     {"slow_reader", &Plan::slow_reader},

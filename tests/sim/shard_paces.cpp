@@ -26,12 +26,10 @@ void SimShards::begin_pace(std::size_t index, const hub::PaceCommand& command) {
   setting_.trace.note("shard {a} paces group {b} by a window of {c}", index,
                       index_of(command.group), command.terms.window);
   std::unique_ptr<Pace>& pace = seat->paces[command.group.value()];
-  const bool begins = pace == nullptr || !pace->counts.active;
-  if (pace == nullptr) pace = std::make_unique<Pace>(nobody_, command.group, command.terms);
-  pace->counts.active = true;
+  const bool begins = pace == nullptr;
   if (begins) {
-    pace->counts.restart_clock();
-    pace->last.reset();
+    pace = std::make_unique<Pace>(nobody_, command.group, command.terms);
+    begin_counts(*seat, *pace, command.number);
   }
   if (!(pace->counts.terms() == command.terms)) {
     pace->counts.set_terms(command.terms);
@@ -45,11 +43,16 @@ void SimShards::begin_pace(std::size_t index, const hub::PaceCommand& command) {
 
 void SimShards::end_pace(std::size_t index, const hub::EndPaceCommand& command) {
   Seat* seat = find(index, command.session.slot, command.session.generation);
-  Pace* pace = seat == nullptr ? nullptr : find_pace(*seat, command.group);
-  if (pace == nullptr) return;
-  pace->held.clear();
-  pace->counts.active = false;
-  if (command.group_gone) seat->paces.erase(command.group.value());
+  if (seat != nullptr) seat->paces.erase(command.group.value());
+}
+
+/// With what is written from now on.
+void SimShards::begin_counts(Seat& seat, Pace& pace, std::uint8_t number) {
+  const auto waiting = std::count_if(seat.data.begin(), seat.data.end(), [&](const Data& each) {
+    const proto::FrameHeader header = proto::load_header(each.frame.data());
+    return header.kind == proto::Kind::group && header.dst == pace.counts.group().value();
+  });
+  pace.counts.begin_counts(number, static_cast<std::uint64_t>(waiting));
 }
 
 bool SimShards::offer(std::size_t index, Seat& seat, Pace& pace, Data data) {
@@ -89,7 +92,6 @@ void SimShards::pass(std::size_t index, Seat& seat, Pace& pace, Data data) {
 }
 
 void SimShards::release_held(std::size_t index, Seat& seat, Pace& pace) {
-  if (!pace.counts.active) return;
   while (!pace.held.empty() && pace.counts.may_begin(in_us(setting_.agenda.now()))) {
     // With a time between two, what is not the newest would only be older by then.
     while (pace.counts.terms().interval_us != 0 && pace.held.size() > 1) pace.held.pop_front();
@@ -126,7 +128,8 @@ void SimShards::wait_until_due(std::size_t index, Seat& seat, Pace& pace) {
 
 void SimShards::on_credit(std::size_t index, Seat& seat, const proto::flow::Credit& credit) {
   Pace* pace = find_pace(seat, credit.group);
-  if (pace == nullptr) return setting_.census.add(Happening::credit_too_late);
+  if (pace == nullptr || pace->counts.number() != credit.number)
+    return setting_.census.add(Happening::credit_too_late);
   require(pace->counts.on_credit(credit.taken), Checker::credit,
           "hub and subscriber count the messages of a service differently");
   setting_.census.add(Happening::credited);
@@ -135,16 +138,11 @@ void SimShards::on_credit(std::size_t index, Seat& seat, const proto::flow::Cred
 
 void SimShards::count_anew(std::size_t index, Seat& seat) {
   for (auto& [group, pace] : seat.paces) {
-    const auto waiting =
-        std::count_if(seat.data.begin(), seat.data.end(), [key = group](const Data& each) {
-          const proto::FrameHeader header = proto::load_header(each.frame.data());
-          return header.kind == proto::Kind::group && header.dst == key;
-        });
     setting_.census.add(Happening::counted_anew);
-    pace->counts.on_new_epoch(static_cast<std::uint64_t>(waiting));
+    begin_counts(seat, *pace, pace->counts.number());
+    const bool has_newer = !pace->held.empty() || pace->counts.uncredited() != 0;
     release_held(index, seat, *pace);
-    const bool has_newer = !pace->held.empty() || waiting != 0;
-    if (pace->counts.active && pace->counts.retained && !has_newer) ask_start(index, seat, *pace);
+    if (pace->counts.retained && !has_newer) ask_start(index, seat, *pace);
   }
 }
 
@@ -159,15 +157,21 @@ void SimShards::ask_start(std::size_t index, const Seat& seat, Pace& pace) {
   const GroupId group = pace.counts.group();
   const hub::GroupMembers* members = parts_.groups.find(index_of(group));
   pace.counts.start_ticket = ++starts_;
-  pace.counts.awaits_start = true;
-  if (members == nullptr) return;  // the subscription is about to end
+  pace.counts.awaits_start = members != nullptr && members->provided();
+  if (!pace.counts.awaits_start) return;
   const ShardIndex self{static_cast<std::uint8_t>(index)};
-  const hub::GroupStart start{group, seat.session.slot, seat.session.generation,
-                              pace.counts.start_ticket, self};
+  const hub::GroupStart start{
+      group, seat.session.slot, seat.session.generation, pace.counts.start_ticket,
+      self,  members->provider};
   const std::size_t provider = members->provider_place.shard.value();
   if (provider == index) return on_start_wanted(index, start);
   setting_.census.add(Happening::start_across_shards);
-  post(provider, {.kind = hub::MailKind::start_wanted, .frame = {}, .start = start});
+  post(index, provider, {.kind = hub::MailKind::start_wanted, .frame = {}, .start = start});
+}
+
+bool SimShards::is_of_another(const hub::GroupStart& start) const {
+  const hub::GroupMembers* members = parts_.groups.find(index_of(start.group));
+  return members != nullptr && members->provided() && members->provider != start.provider;
 }
 
 void SimShards::on_start_wanted(std::size_t index, const hub::GroupStart& start) {
@@ -180,14 +184,14 @@ void SimShards::on_start_wanted(std::size_t index, const hub::GroupStart& start)
     if (kept != nullptr) on_handed(start, Bytes{kept->frame});
     return;
   }
-  post(to, {.kind = hub::MailKind::start, .frame = {}, .start = start});
+  post(index, to, {.kind = hub::MailKind::start, .frame = {}, .start = start});
   if (kept != nullptr)
-    post(to, {.kind = hub::MailKind::retained, .frame = kept->frame, .start = start});
+    post(index, to, {.kind = hub::MailKind::retained, .frame = kept->frame, .start = start});
 }
 
 void SimShards::require_last(const hub::GroupStart& start, const Kept* kept) const {
   const std::uint64_t stream = witness_->retained_stream(index_of(start.group));
-  if (stream == 0) return;  // it ended while this was under way
+  if (stream == 0 || is_of_another(start)) return;  // it ended while this was under way
   const auto last = last_.find(index_of(start.group));
   const bool any = last != last_.end() && last->second.stream == stream;
   require(any == (kept != nullptr), Checker::retained,
@@ -205,12 +209,18 @@ SimShards::Pace* SimShards::pace_of(const hub::GroupStart& start) {
 }
 
 void SimShards::on_start(const hub::GroupStart& start) {
-  if (Pace* pace = pace_of(start)) pace->counts.awaits_start = false;
+  Pace* pace = pace_of(start);
+  if (pace == nullptr) return;
+  if (is_of_another(start)) {
+    const std::size_t shard = start.shard.value();
+    return ask_start(shard, *find(shard, start.slot, start.generation), *pace);
+  }
+  pace->counts.awaits_start = false;
 }
 
 void SimShards::on_handed(const hub::GroupStart& start, const Bytes& frame) {
   Pace* pace = pace_of(start);
-  if (pace == nullptr || !pace->counts.active) return;
+  if (pace == nullptr || is_of_another(start)) return;
   setting_.census.add(Happening::last_message_first);
   Seat& seat = *find(start.shard.value(), start.slot, start.generation);
   static_cast<void>(offer(start.shard.value(), seat, *pace, {frame, seat.number}));
@@ -223,7 +233,6 @@ void SimShards::require_at_rest() const {
     for (const std::unique_ptr<Seat>& seat : shard.seats) {
       if (seat == nullptr) continue;
       for (const auto& [group, pace] : seat->paces) {
-        if (!pace->counts.active) continue;
         require(pace->held.empty(), Checker::credit, "a message is held for ever");
         require(pace->counts.terms().window == 0 || pace->counts.uncredited() == 0, Checker::credit,
                 "a window is narrower than it ought to be, and all was credited");

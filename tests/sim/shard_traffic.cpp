@@ -84,14 +84,7 @@ void SimShards::on_flow(std::size_t index, Seat& seat, const Bytes& frame) {
           "a simulated node said something of FLOW that cannot be read");
   if (const auto* credit = std::get_if<proto::flow::Credit>(&*message))
     return on_credit(index, seat, *credit);
-  const auto* pong = std::get_if<proto::flow::Pong>(&*message);
-  require(pong != nullptr, Checker::seam,
-          "a simulated node said something of FLOW that is no CREDIT and no PONG");
-  const auto asked = seat.reading.extract(pong->sequence);
-  if (!asked) return;  // of an earlier connection
-  push_event(index,
-             {ShardIndex{static_cast<std::uint8_t>(index)},
-              hub::MovesReadEvent{seat.session, seat.attachment, seat.node, asked.mapped()}});
+  broken(Checker::seam, "a simulated node said something of FLOW that is no CREDIT");
 }
 
 bool SimShards::handle_control(std::size_t index, Seat& seat, Bytes frame) {
@@ -109,14 +102,14 @@ bool SimShards::handle_control(std::size_t index, Seat& seat, Bytes frame) {
 void SimShards::take_mail(std::size_t index) {
   Shard& shard = shards_[index];
   take_commands(index, shard.commands.size());
-  for (std::size_t count = shard.mail.size(); count > 0; --count) {
-    const Mail mail = std::move(shard.mail.front());
-    shard.mail.pop_front();
+  // Each sender's in order, and those of different ones in any.
+  while (!shard.mail.empty()) {
+    auto sender = shard.mail.begin();
+    std::advance(sender, static_cast<std::ptrdiff_t>(setting_.random.below(shard.mail.size())));
+    const Mail mail = std::move(sender->second.front());
+    sender->second.pop_front();
+    if (sender->second.empty()) shard.mail.erase(sender);
     switch (mail.kind) {
-      case hub::MailKind::fence:
-        push_event(index, {ShardIndex{static_cast<std::uint8_t>(index)},
-                           hub::FencePassedEvent{mail.fence}});
-        break;
       case hub::MailKind::last:
         ++shards_[index].lasts;
         end_drain_if_all(index);
@@ -136,17 +129,9 @@ void SimShards::take_mail(std::size_t index) {
   }
 }
 
-void SimShards::post_fence(std::size_t index, std::uint32_t ticket) {
-  const hub::Fence fence{ShardIndex{static_cast<std::uint8_t>(index)}, ticket};
-  for (std::size_t other = 0; other < shards_.size(); ++other) {
-    if (other == index) continue;
-    post(other, {.kind = hub::MailKind::fence, .frame = {}, .fence = fence});
-  }
-}
-
-void SimShards::post(std::size_t index, Mail mail) {
-  shards_[index].mail.push_back(std::move(mail));
-  want_turn(index);
+void SimShards::post(std::size_t from, std::size_t to, Mail mail) {
+  shards_[to].mail[from].push_back(std::move(mail));
+  want_turn(to);
 }
 
 void SimShards::route(std::size_t index, const Bytes& frame, bool handed_over) {
@@ -176,7 +161,7 @@ void SimShards::to_place(std::size_t index, const Bytes& frame, const To& to, bo
   if (shard != index) {
     if (handed_over) return;
     setting_.census.add(Happening::unicast_across_shards);
-    return post(shard, {.frame = frame});
+    return post(index, shard, {.frame = frame});
   }
   Seat* seat = find(index, to.place.slot, to.place.generation);
   if (seat != nullptr) deliver(index, *seat, frame, to.session);
@@ -186,14 +171,13 @@ void SimShards::to_group(std::size_t index, const Bytes& frame, bool handed_over
   const proto::FrameHeader header = proto::load_header(frame.data());
   const std::uint32_t group = index_of(GroupId{header.dst});
   const GroupMembers* members = parts_.groups.find(group);
-  if (members != nullptr && members->ends())
-    return;  // the model knows of it no more, nor who subscribed
-  if (members == nullptr || members->provider.value() != header.src) {
-    if (members != nullptr) setting_.census.add(Happening::group_of_another);
-    return;
-  }
-  require(witness_->provides(index_of(NodeId{header.src}), group), Checker::group_table,
-          "a node sends to a group that is not of a service of its own");
+  if (members == nullptr) return;
+  const bool from_provider = members->provider.value() == header.src;
+  if (!from_provider && (members->provided() || !handed_over))
+    return setting_.census.add(Happening::group_of_another);
+  if (!from_provider) setting_.census.add(Happening::group_of_nobody);
+  require(!from_provider || witness_->provides(index_of(NodeId{header.src}), group),
+          Checker::group_table, "a node sends to a group that is not of a service of its own");
   members->by_shard[index].for_each([&](const GroupMember& member) {
     Seat* seat = find(index, member.slot, member.generation);
     if (seat == nullptr) return;
@@ -206,7 +190,7 @@ void SimShards::to_group(std::size_t index, const Bytes& frame, bool handed_over
   for (std::size_t other = 0; other < shards_.size(); ++other) {
     const bool any =
         !members->by_shard[other].empty() || (paced && !members->paced_by_shard[other].empty());
-    if (other != index && any) post(other, {.frame = frame});
+    if (other != index && any) post(index, other, {.frame = frame});
   }
   if (members->retain) keep_last(index, frame);
   if (const std::uint64_t stream = witness_->retained_stream(group))
@@ -222,7 +206,7 @@ void SimShards::to_paced(std::size_t index, const Bytes& frame,
     require_subscribed(*seat, index_of(group));
     const std::uint64_t session = witness_->session_of(index_of(seat->node));
     Pace* pace = find_pace(*seat, group);
-    if (pace != nullptr && pace->counts.active) {
+    if (pace != nullptr) {
       static_cast<void>(offer(index, *seat, *pace, {frame, session}));
     } else if (member.was_plain) {
       deliver(index, *seat, frame, session);
@@ -238,7 +222,7 @@ void SimShards::require_subscribed(const Seat& seat, std::uint32_t group) const 
 void SimShards::to_provider(std::size_t index, const Bytes& frame, bool handed_over) {
   const GroupMembers* members =
       parts_.groups.find(index_of(GroupId{proto::load_header(frame.data()).dst}));
-  if (members == nullptr || members->ends()) return;
+  if (members == nullptr || !members->provided()) return;
   if (!members->accepts) return setting_.census.add(Happening::service_frame_refused);
   to_place(index, frame,
            {members->provider_place, witness_->session_of(index_of(members->provider))},

@@ -1,7 +1,6 @@
 #include "tests/sim/shards.hpp"
 
 #include <algorithm>
-#include <array>
 
 #include "base/endian.hpp"
 #include "hub/shard/control_frame.hpp"
@@ -41,7 +40,7 @@ void SimShards::send(ShardIndex index, ShardCommand command) {
   if (auto* tell = std::get_if<hub::TellCommand>(&command)) {
     for (const hub::TellCommand::To& to : tell->to) {
       hub::set_destination(tell->frame, to.node);
-      send(index, hub::SendControlCommand{to.session, 0, tell->frame, 0, tell->move});
+      send(index, hub::SendControlCommand{to.session, 0, tell->frame, 0});
     }
     return;
   }
@@ -132,9 +131,7 @@ void SimShards::execute(std::size_t index, ShardCommand& command) {
     Seat* seat = find(index, renumbered->session.slot, renumbered->session.generation);
     require(seat != nullptr, Checker::seam,
             "a session gets another id that the shard does not know");
-    for (auto& [group, kept] : shards_[index].kept) {
-      if (kept.provider == seat->node) kept.provider = renumbered->node;
-    }
+    rename_source(index, seat->node, renumbered->node);
     if (seat->wire) close(index, *seat, GoodbyeCode::renumbered, renumbered->sentence.c_str());
     lose_data(*seat);
     seat->node = renumbered->node;
@@ -145,9 +142,9 @@ void SimShards::execute(std::size_t index, ShardCommand& command) {
   } else if (const auto* ended = std::get_if<hub::EndPaceCommand>(&command)) {
     end_pace(index, *ended);
   } else if (const auto* forget = std::get_if<hub::ForgetRetainedCommand>(&command)) {
-    shards_[index].kept.erase(forget->group.value());
-  } else if (const auto* fence = std::get_if<hub::FenceCommand>(&command)) {
-    post_fence(index, fence->ticket);
+    const auto kept = shards_[index].kept.find(forget->group.value());
+    if (kept != shards_[index].kept.end() && kept->second.provider == forget->provider)
+      shards_[index].kept.erase(kept);
   } else if (std::holds_alternative<hub::DrainCommand>(command)) {
     drain(index);
   } else if (std::holds_alternative<hub::StopCommand>(command)) {
@@ -208,10 +205,7 @@ void SimShards::attach(std::size_t index, AttachCommand& command) {
     seat.control.emplace_back(command.told.data() + at, command.told.data() + at + size);
     at += size;
   }
-  if (!command.told.empty()) {
-    setting_.census.add(Happening::moves_told_again);
-    ask_whether_read(seat, command.told_move);
-  }
+  if (!command.told.empty()) setting_.census.add(Happening::moves_told_again);
   count_anew(index, seat);
   if (!wire->at_hub.empty() || wire->end_arrived) has_something(*wire);
   if (!wire->node_open) setting_.census.add(Happening::hello_of_the_dead);
@@ -226,18 +220,22 @@ void SimShards::say(std::size_t index, const hub::SendControlCommand& command) {
   require(seat->requests >= command.answers, Checker::answers,
           "more answers than requests on a connection");
   seat->requests -= command.answers;
+  Pace* begun = command.counts ? find_pace(*seat, command.counts->group) : nullptr;
   seat->control.push_back(command.frame);
-  if (command.move != 0) ask_whether_read(*seat, command.move);
+  if (begun != nullptr) {
+    begin_counts(*seat, *begun, command.counts->number);
+    release_held(index, *seat, *begun);
+  }
   want_flush(index, *seat);
 }
 
-void SimShards::ask_whether_read(Seat& seat, std::uint64_t move) {
-  seat.reading[++seat.pings] = move;
-  std::array<std::byte, proto::flow::kSizeMax> bytes{};
-  const std::size_t size = proto::flow::encode(proto::flow::Ping{seat.pings, 0}, bytes);
-  proto::FrameHeader header;
-  header.kind = proto::Kind::flow;
-  seat.control.push_back(frame_of(header, std::span{bytes}.first(size)));
+/// A REASSIGN: the provider's last messages are from its new id.
+void SimShards::rename_source(std::size_t index, NodeId former, NodeId present) {
+  for (auto& [group, kept] : shards_[index].kept) {
+    if (kept.provider != former) continue;
+    kept.provider = present;
+    store_le(kept.frame.data() + proto::kSrcOffset, present.value());
+  }
 }
 
 void SimShards::release(std::size_t index, hub::SessionRef session) {
@@ -254,7 +252,7 @@ void SimShards::release(std::size_t index, hub::SessionRef session) {
 void SimShards::drain(std::size_t index) {
   shards_[index].draining = true;
   for (std::size_t other = 0; other < shards_.size(); ++other) {
-    if (other != index) post(other, {.kind = hub::MailKind::last, .frame = {}});
+    if (other != index) post(index, other, {.kind = hub::MailKind::last, .frame = {}});
   }
   end_drain_if_all(index);
 }
@@ -291,7 +289,6 @@ void SimShards::detach(Seat& seat, std::optional<proto::Goodbye> told) {
   parts_.network.close_by_hub(wire);
   seat.requests = 0;
   seat.control.clear();
-  seat.reading.clear();
   if (!seat.waits_when_away) lose_data(seat);
 }
 

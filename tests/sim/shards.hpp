@@ -110,9 +110,6 @@ class SimShards final : public hub::ShardProxy {
     bool waits_when_away = false;
     std::uint64_t requests = 0;
     std::deque<Bytes> control;
-    std::uint32_t pings = 0;
-    std::map<std::uint32_t, std::uint64_t>
-        reading;  ///< moves that the conductor wants to know read, by PING
     std::deque<Data> data;
     std::map<std::uint32_t, std::unique_ptr<Pace>> paces;  ///< by group
     bool ready = false;
@@ -121,7 +118,6 @@ class SimShards final : public hub::ShardProxy {
   struct Mail {
     hub::MailKind kind = hub::MailKind::frames;
     Bytes frame;
-    hub::Fence fence{};
     hub::GroupStart start{};
   };
   /// The last message of a retained group, on its provider's shard.
@@ -132,11 +128,11 @@ class SimShards final : public hub::ShardProxy {
   struct Shard {
     std::deque<hub::ShardCommand> commands;
     std::deque<hub::ShardEvent> events;
-    std::deque<Mail> mail;
-    std::vector<std::unique_ptr<Seat>> seats;  ///< by slot
-    std::vector<bool> used;                    ///< by slot: somebody had it before
-    std::vector<std::uint32_t> ready;          ///< slots to be read
-    std::map<std::uint32_t, Kept> kept;        ///< by group
+    std::map<std::size_t, std::deque<Mail>> mail;  ///< by the shard that sent it; none is empty
+    std::vector<std::unique_ptr<Seat>> seats;      ///< by slot
+    std::vector<bool> used;                        ///< by slot: somebody had it before
+    std::vector<std::uint32_t> ready;              ///< slots to be read
+    std::map<std::uint32_t, Kept> kept;            ///< by group
     bool turn_due = false;
     bool draining = false;
     std::size_t lasts = 0;  ///< other shards that drain, too, and of which everything came
@@ -151,14 +147,12 @@ class SimShards final : public hub::ShardProxy {
   void attach(std::size_t shard, hub::AttachCommand& command);
   Seat& seat_for(std::size_t shard, const hub::AttachCommand& command);
   void say(std::size_t shard, const hub::SendControlCommand& command);
-  void ask_whether_read(Seat& seat, std::uint64_t move);
   void on_flow(std::size_t shard, Seat& seat, const Bytes& frame);
   void release(std::size_t shard, hub::SessionRef session);
   void drain(std::size_t shard);
   /// When each other shard has handed over its last.
   void end_drain_if_all(std::size_t shard);
   void finish_drain(std::size_t shard);
-  void post_fence(std::size_t shard, std::uint32_t ticket);
   void read(std::size_t shard, Seat& seat);
   /// False: the connection has ended.
   bool handle(std::size_t shard, Seat& seat, Bytes frame);
@@ -186,7 +180,7 @@ class SimShards final : public hub::ShardProxy {
   static void require_for(const Seat& seat, std::uint64_t session);
   void push(std::size_t shard, Seat& seat, Data data);
   [[nodiscard]] std::vector<GroupId> make_room(Seat& seat, const proto::FrameHeader& header);
-  void post(std::size_t shard, Mail mail);
+  void post(std::size_t from, std::size_t to, Mail mail);
 
   // Pace: as hub/data/fanout/pacer.hpp and retained_messages.hpp do it, for messages of one frame
   void begin_pace(std::size_t shard, const hub::PaceCommand& command);
@@ -204,6 +198,9 @@ class SimShards final : public hub::ShardProxy {
   void count_anew(std::size_t shard, Seat& seat);
   void keep_last(std::size_t shard, const Bytes& frame);
   void ask_start(std::size_t shard, const Seat& seat, Pace& pace);
+  void begin_counts(Seat& seat, Pace& pace, std::uint8_t number);
+  [[nodiscard]] bool is_of_another(const hub::GroupStart& start) const;
+  void rename_source(std::size_t shard, NodeId former, NodeId present);
   void on_start_wanted(std::size_t shard, const hub::GroupStart& start);
   void require_last(const hub::GroupStart& start, const Kept* kept) const;
   [[nodiscard]] Pace* pace_of(const hub::GroupStart& start);

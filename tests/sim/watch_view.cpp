@@ -88,6 +88,7 @@ void WatchView::require_services(const Model& model) const {
   std::size_t due = 0;
   for (const auto& [group, topic] : model.groups()) {
     if ((subjects_ & ns::kWatchServices) == 0 || !fits(topic->first)) continue;
+    if (!topic->second.service->provided()) continue;
     ++due;
     const auto found = services_.find(group);
     if (found == services_.end() || found->second.name != topic->first ||

@@ -56,7 +56,8 @@ Past World::make_disk() {
   disk_.boot = random.below(1'000);
   Past past;
   draw_used(random, disk_.node_mark, disk_.nodes_used, past.nodes);
-  draw_used(random, disk_.group_mark, disk_.groups_used, past.groups);
+  if (random.chance(500))
+    disk_.group_mark = kEveryIndex - 1 - static_cast<std::uint32_t>(random.between(1, 400));
   return past;
 }
 
@@ -80,7 +81,6 @@ void World::begin_life(Past past) {
   if (disk_.boot > 1)
     past.returns_until = setting_.agenda.now_ms() + milliseconds{setting_.plan.limits.grace_ms};
   past.nodes.used = start->nodes.used;
-  past.groups.used = start->groups.used;
   // Fewer than a real start grants, so that more are asked for.
   for (hub::IndexRange* range : {&start->nodes, &start->groups}) {
     const std::uint64_t fewer = hub::IndexPool::kBlock / 2 - setting_.random.between(1, 200);
@@ -368,8 +368,8 @@ void World::require_agreed(const SimNode& node) const {
   for (const auto& [full_name, subscribed_to] : node.subscribes()) {
     const Model::Topic* topic = model.topic(full_name);
     const bool subscribed = topic != nullptr && topic->subscribers.contains(index);
-    const std::uint32_t right = subscribed && topic->service ? topic->service->group : 0;
-    if (!subscribed || index_of(subscribed_to.group) != right) {
+    if (!subscribed || model.state_of(*topic, index).group != subscribed_to.known.group ||
+        model.state_of(*topic, index).provider != subscribed_to.known.provider) {
       broken(Checker::convergence,
              "node " + std::to_string(index) + " is wrong about the service " + full_name);
     }

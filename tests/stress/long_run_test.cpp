@@ -66,8 +66,6 @@ class LongRun : public ::testing::Test {
     std::string name;
     std::vector<std::byte> token;
     TestConductor::Node node;
-    GroupId group;
-    std::vector<std::byte> proof;
     bool connected = false;
   };
 
@@ -94,13 +92,9 @@ class LongRun : public ::testing::Test {
   }
 
   void declare(Member& member) {
-    proto::ns::Advertise service{.service = "data"};
-    service.former_group = member.group;
-    service.former_proof = member.proof;
-    const auto offered = hub_.ask<proto::ns::AdvertiseAnswer>(member.node, service);
+    const auto offered =
+        hub_.ask<proto::ns::AdvertiseAnswer>(member.node, proto::ns::Advertise{.service = "data"});
     ASSERT_TRUE(offered) << offered.error().sentence;
-    member.group = offered->group;
-    member.proof = offered->proof;
     // Of one that is there, of one that may not be, and of a name that nobody has.
     for (const std::size_t other :
          {random_() % kNodes, random_() % kNodes, kNodes + random_() % 50}) {
@@ -128,11 +122,6 @@ class LongRun : public ::testing::Test {
       hub_.conductor.tick(hub_.now);
   }
   bool react(const FakeShards::Sent& sent) {
-    if (const auto* fence = std::get_if<FenceCommand>(&sent.command)) {
-      const ShardIndex other{static_cast<std::uint8_t>(1 - sent.shard.value())};
-      hub_.conductor.on_event({other, FencePassedEvent{{sent.shard, fence->ticket}}}, hub_.now);
-      return true;
-    }
     const auto* said = std::get_if<SendControlCommand>(&sent.command);
     if (said == nullptr) return false;
     const auto view = proto::split_control(TestConductor::payload_of(*said));

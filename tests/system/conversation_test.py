@@ -114,7 +114,7 @@ def exchange_messages(viewer, robot, odom, chart, drive):
 
 def change_names_and_end_services(viewer, robot, odom, chart):
     viewer.numbered(NS, 11, text(3, "robot/odom"))
-    robot.event(34)
+    robot.event(33)
     viewer.numbered(NS, 1, text(3, "lookout"))
     viewer.watched()
     viewer.numbered(NS, 1, text(3, "robot"))
@@ -262,7 +262,7 @@ class Conversation(unittest.TestCase):
         steps = conversation.load(RECORDING)
         said = {(step.kind, step.operation) for step in steps if not step.is_opening and step.kind in (LINK, NS, CTRL)}
         requests = {(NS, operation) for operation in range(1, 14)} | {(CTRL, op) for op in (1, 2, 3, 4, 5, 7, 8, 9)}
-        events = {(NS, operation) for operation in (32, 33, 34, 37)}
+        events = {(NS, operation) for operation in (32, 33, 37)}
         links = {(LINK, operation) for operation in (1, 2, 3)}
         answers = {(kind, operation | 0x8000) for kind, operation in requests}
         self.assertEqual(requests | events | links | answers - said, requests | events | links)

@@ -74,7 +74,7 @@ class HostileNode:
         own = [client.ask(NS, ADVERTISE, text(3, "odom")),
                client.ask(NS, ADVERTISE, text(3, "sink") + number(6, 2, ACCEPTS))]
         around.own_id, around.own_groups = client.id, [answer[3] for answer in own]
-        around.groups = [client.ask(NS, SUBSCRIBE, text(3, "P/odom"))[3], *around.own_groups]
+        around.groups = [client.ask(NS, SUBSCRIBE, text(3, "P/odom"))[4], *around.own_groups]
         self._reads = self._random.random() < 0.7
         self._waiting.clear()
         client.socket.setblocking(False)

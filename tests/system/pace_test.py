@@ -49,7 +49,7 @@ class Windows(unittest.TestCase):
         hub = Hub(self)
         provider = Provider(self, hub, SYNC_DELIVERY, 4)
         client = Client(self, hub).join()
-        self.assertEqual(subscribe(client, "A/B", window=2, depth=3)[8], 2)
+        self.assertEqual(subscribe(client, "A/B", window=2, depth=3)[10], 2)
         for _ in range(9):
             provider.publish(10)
 

@@ -150,7 +150,7 @@ class Rates(unittest.TestCase):
         for shards in (1, 2):
             with self.subTest(shards=shards):
                 for way in self.run_rates(SYNC_DELIVERY, 1, shards, 2000 if FULL else 400):
-                    self.assertEqual(way.subscriber.answer[8], 1, "the window in force")
+                    self.assertEqual(way.subscriber.answer[10], 1, "the window in force")
                     self.assertEqual(way.subscriber.stale, [], "what it got was older than what its hub had when it credited")
 
     def test_latest_gives_each_the_newest_at_its_own_rate(self):

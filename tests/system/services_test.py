@@ -382,9 +382,9 @@ class Names(unittest.TestCase):
         answer = client.ask(NS, 7, text(3, "odom") + number(4, 4, 1) + number(5, 4, 2))
         self.assertNotIn(answer.get(1), (1, 2, 3, 4, 5, 6))
         other = Client(self, hub).join()
-        self.assertEqual(other.ask(NS, 10, text(3, "raw/client/odom"))[3], answer[3])
-        joined = client.next_where(lambda got: got.kind == NS and got.operation == 33)
-        self.assertEqual(joined.fields[4], other.id)
+        self.assertEqual(other.ask(NS, 10, text(3, "raw/client/odom"))[4], answer[3])
+        told = client.next_where(lambda got: got.kind == NS and got.operation == 33)
+        self.assertEqual((told.fields[3], told.fields[4]), (answer[3], 1), "subscribers now")
 
 
 if __name__ == "__main__":

@@ -206,7 +206,7 @@ class Latest(unittest.TestCase):
         client = Client(self, hub, receive_bytes=RECEIVE_BUFFER).join()
         publisher = Client(self, hub).join("camera")
         group = publisher.ask(NS, 7, text(3, "image") + number(7, 2, 1))[3]
-        self.assertEqual(client.ask(NS, 10, text(3, "camera/image"))[3], group)
+        self.assertEqual(client.ask(NS, 10, text(3, "camera/image"))[4], group)
         reader, messages, published, ages = ByteReader(client, MEGABYTE), Messages(), [], {}
         while len(published) < 300:
             self.publish(publisher, group, len(published))

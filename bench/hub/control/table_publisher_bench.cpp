@@ -56,7 +56,7 @@ void change(benchmark::State& state, Publish publish) {
   for (auto _ : state) {
     const NodeIndex node =
         hub.subscribers[1 + ++step * 7'919 % static_cast<std::size_t>(state.range(0))];
-    static_cast<void>(services.unsubscribe(node, "robot/odom", hub.effects));
+    static_cast<void>(services.unsubscribe(node, "robot/odom", {}, hub.effects));
     publish(hub, node);
     static_cast<void>(services.subscribe(node, "robot/odom", {}, hub.effects));
     publish(hub, node);

@@ -26,8 +26,7 @@ void check_requests(Bytes payload) {
   fuzz::check_message<ns::Subscribe>(payload);
   fuzz::check_message<ns::Unsubscribe>(payload);
   fuzz::check_message<ns::ServiceMoved>(payload);
-  fuzz::check_message<ns::SubscriberJoined>(payload);
-  fuzz::check_message<ns::SubscriberLeft>(payload);
+  fuzz::check_message<ns::Subscribers>(payload);
   fuzz::check_message<ns::RegisterName>(payload);
   fuzz::check_message<ns::UnregisterName>(payload);
   fuzz::check_message<ns::NameConfirmed>(payload);

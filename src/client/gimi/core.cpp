@@ -204,8 +204,7 @@ nif_verdict Core::dispatch(const nif_incoming& in) {
     case NIF_SESSION_REPLACED:
       on_disconnected(in);
       return NIF_DONE;
-    case NIF_SUBSCRIBER_JOINED:
-    case NIF_SUBSCRIBER_LEFT:
+    case NIF_SUBSCRIBERS:
       return verdict_of(services_.on_subscribers(in.group, in.count));
     case NIF_SERVICE_MOVED:
       return verdict_of(services_.on_service_moved(in));

@@ -26,7 +26,7 @@ Outcome<void> SendStream::send(BytesView data, Timeout timeout, More more) {
     sequence = window_.open(data.size(), steady_now_ns());
     to = destination_;
   }
-  const nif_status status = transmit(to, {sequence, Operation::data, 0, 0, epoch_}, data, more,
+  const nif_status status = transmit(to, {sequence, Operation::data, 0, 0, to.epoch}, data, more,
                                      nif_timeout_until(deadline));
   auto failure = status == NIF_OK ? Failure{} : failure_of(status, "send to " + target());
   bool unwatched = false;
@@ -109,7 +109,7 @@ nif_status SendStream::transmit(const Destination& to, const proto::gimi::Messag
 nif_status SendStream::transmit_ping(const Destination& to, std::uint32_t number) const {
   std::array<std::byte, proto::gimi::kPingTimeSize> sent;
   store_le(sent.data(), wall_now_ns());
-  return transmit(to, {number, Operation::ping, 0, 0, epoch_}, sent, More::no, 0);
+  return transmit(to, {number, Operation::ping, 0, 0, to.epoch}, sent, More::no, 0);
 }
 
 /// True: somebody should watch over the stream. Another thread may have left a message to be held
@@ -225,13 +225,24 @@ void SendStream::on_broken(const Loss& why) {
 
 void SendStream::on_moved(const ServicePlace& place) {
   const MutexLock lock(mutex_);
-  if (place.group == destination_.id) return;
-  lose_all(place.group == 0 ? withdrawn()
-                            : Loss{LossReason::service_gone,
-                                   "the service is somewhere else now, and cannot tell any more"});
-  destination_.id = place.group;
-  if (place.group != 0) destination_.key = place.key;
+  const std::uint32_t id = place.destination();
+  const bool same =
+      id == destination_.id && place.provider == place_.provider && place.session == place_.session;
+  place_ = place;
+  if (same) return;
+  lose_all(id == 0 ? withdrawn()
+                   : Loss{LossReason::service_gone,
+                          "the service is somewhere else now, and cannot tell any more"});
+  // Another provider knows nothing of what the former one got.
+  destination_.epoch = Uplink::draw_epoch();
+  destination_.id = id;
+  if (id != 0) destination_.key = place.key;
   changed_.notify_all();
+}
+
+std::uint32_t SendStream::epoch() {
+  const MutexLock lock(mutex_);
+  return destination_.epoch;
 }
 
 void SendStream::end(const Ending& ending) {
@@ -275,7 +286,7 @@ bool SendStream::tick(std::int64_t now_ns) {
   }
   if (data) {
     const nif_status status =
-        transmit(to, {sequence, Operation::data, 0, 0, epoch_}, *data, More::no, 0);
+        transmit(to, {sequence, Operation::data, 0, 0, to.epoch}, *data, More::no, 0);
     const MutexLock lock(mutex_);
     static_cast<void>(finish(sequence, status, More::no));
     // Before the turn is anybody else's, whose message is newer.

@@ -29,10 +29,15 @@ class StreamKeeper {
 
 /// Where a service is that a stream leads to.
 struct ServicePlace {
-  std::uint32_t group = 0;  ///< 0: nobody has it at the moment
+  std::uint32_t group = 0;     ///< 0: none at the moment
+  std::uint32_t provider = 0;  ///< 0: nobody
+  std::uint64_t session = 0;   ///< of the provider
   MessageKey key;
   bool accepts = false;  ///< it takes data, and gives none
   bool latest = false;   ///< of Delivery::latest
+
+  /// Where messages go; 0: nobody takes them.
+  [[nodiscard]] std::uint32_t destination() const { return provider != 0 ? group : 0; }
 };
 
 /// A stream of DATA with one key, to one node or to whoever accepts one service. Thread safety: any
@@ -44,7 +49,7 @@ class SendStream {
         keeper_(keeper),
         to_(to),
         options_(options),
-        destination_{NIF_UNICAST, to.id, options.key},
+        destination_{NIF_UNICAST, to.id, options.key, Uplink::draw_epoch()},
         window_(options.window) {}
   /// `service`: its full name.
   SendStream(Uplink& uplink, StreamKeeper& keeper, std::string service, const ServicePlace& place,
@@ -53,7 +58,8 @@ class SendStream {
         keeper_(keeper),
         service_(std::move(service)),
         options_(options),
-        destination_{NIF_SERVICE, place.group, place.key},
+        place_(place),
+        destination_{NIF_SERVICE, place.destination(), place.key, Uplink::draw_epoch()},
         window_(options.window) {}
   [[nodiscard]] const Home& home() const { return uplink_.home(); }
 
@@ -65,8 +71,9 @@ class SendStream {
   [[nodiscard]] Peer to() const { return to_; }
   /// "" of a stream to a node.
   [[nodiscard]] const std::string& service() const { return service_; }
-  /// Drawn when the stream is made; tells it from those of a former process under the same id.
-  [[nodiscard]] std::uint32_t epoch() const { return epoch_; }
+  /// Drawn when the stream is made, and when its service has another provider; tells it from those
+  /// of a former process under the same id.
+  [[nodiscard]] std::uint32_t epoch() GIMNET_EXCLUDES(mutex_);
 
   /// True: a message that is held can go; tick() sends it.
   [[nodiscard]] bool on_ack(std::uint32_t sequence, const proto::gimi::Ack& ack)
@@ -96,6 +103,7 @@ class SendStream {
     nif_kind kind = NIF_UNICAST;
     std::uint32_t id = 0;  ///< 0: a service that nobody has
     MessageKey key;
+    std::uint32_t epoch = 0;
   };
   /// Waits for this thread's turn, and for room in the window. After Turn::send `sending_` is this
   /// thread's.
@@ -121,10 +129,10 @@ class SendStream {
   const Peer to_;
   const std::string service_;
   const SendOptions options_;
-  const std::uint32_t epoch_ = Uplink::draw_epoch();
 
   Mutex mutex_;
   Condition changed_;
+  ServicePlace place_ GIMNET_GUARDED_BY(mutex_);  ///< of a stream to a service
   Destination destination_ GIMNET_GUARDED_BY(mutex_);
   SendWindow window_ GIMNET_GUARDED_BY(mutex_);
   SendCounts counts_ GIMNET_GUARDED_BY(mutex_);

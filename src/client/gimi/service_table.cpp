@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "client/gimi/ending.hpp"
-#include "proto/control/ns.hpp"
 
 namespace gimnet::gimi {
 namespace {
@@ -129,9 +128,8 @@ std::size_t ServiceTable::subscriptions() {
 /// A former group leads to the service until as many younger ones came: the event that a provider
 /// left may overtake what it published.
 void ServiceTable::set_place(const Subscribed& subscribed, const ServicePlace& place) {
-  // The one that was known, those of which a hub tells at a return (docs/protocol.md, section 8),
-  // and the present one.
-  constexpr std::size_t kGroups = proto::ns::kGroupsBetweenMax + 2;
+  // The present one and the one before: a service gets another group when its terms change.
+  constexpr std::size_t kGroups = 2;
   SubscribedService& service = *subscribed;
   service.place = place;
   service.on_place(place);
@@ -160,6 +158,8 @@ nif_status ServiceTable::ask(const Subscribed& service, const PaceOptions& pace,
       nif_subscribe_paced(uplink_.node(), service->name().c_str(), &wanted, &found, timeout_ms);
   if (status != NIF_OK) return status;
   const ServicePlace place{found.group,
+                           found.provider,
+                           found.session,
                            {found.message_type, found.instance},
                            found.direction == NIF_ACCEPTS,
                            found.delivery == NIF_LATEST_DELIVERY};
@@ -340,6 +340,8 @@ std::optional<Failure> ServiceTable::refusal_of(const nif_incoming& moved) {
 ServiceTable::Place ServiceTable::on_service_moved(const nif_incoming& moved) {
   const std::string full_name = moved.text;
   const ServicePlace place{moved.group,
+                           moved.from,
+                           moved.count,
                            {moved.message_type, moved.instance},
                            moved.direction == NIF_ACCEPTS,
                            moved.delivery == NIF_LATEST_DELIVERY};

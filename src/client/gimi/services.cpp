@@ -241,8 +241,8 @@ void SubscribedService::on_message(const Position& message) {
 
 void SubscribedService::on_place(const ServicePlace& now) {
   const MutexLock lock(mutex_);
-  exists_ = now.group != 0 && !now.accepts;
-  accepts_ = now.group != 0 && now.accepts;
+  exists_ = now.destination() != 0 && !now.accepts;
+  accepts_ = now.destination() != 0 && now.accepts;
   refusal_.reset();
   changed_.notify_all();
 }

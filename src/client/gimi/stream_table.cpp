@@ -66,7 +66,7 @@ Outcome<StreamTable::Stream> StreamTable::service_stream(const std::string& full
   }
   if (auto failure = obstacle(options)) return *failure;
   auto made = std::make_shared<SendStream>(uplink_, *this, full_name, place, options);
-  if (place.group != 0) by_group_[place.group] = made;
+  if (place.destination() != 0) by_group_[place.group] = made;
   services_.emplace(full_name, Service{made, ++asked_});
   return made;
 }
@@ -105,7 +105,7 @@ void StreamTable::on_service_moved(const std::string& full_name, const ServicePl
     if (known == services_.end()) return;
     stream = known->second.stream;
     std::erase_if(by_group_, [&stream](const auto& entry) { return entry.second == stream; });
-    if (place.group != 0) by_group_[place.group] = stream;
+    if (place.destination() != 0) by_group_[place.group] = stream;
   }
   stream->on_moved(place);
 }

@@ -5,42 +5,31 @@
 namespace gimnet::nif {
 
 void CreditBook::begin(bool resumed) {
-  plain_.fill(0);
   const MutexLock lock(mutex_);
-  if (resumed) {
-    std::erase_if(accounts_, [](const auto& entry) { return entry.second.state == State::plain; });
-    return;
-  }
-  ++epoch_;
-  std::erase_if(accounts_, [](const auto& entry) { return entry.second.state != State::counted; });
-  for (auto& [group, account] : accounts_) account.taken = account.told = 0;
+  if (resumed) return;
+  for (auto& [group, account] : accounts_) restart(account);
 }
 
 void CreditBook::tell_all() {
   const MutexLock lock(mutex_);
   for (auto& [group, account] : accounts_) {
-    if (account.taken != 0 && account.state == State::counted) tell(group, account);
+    if (account.taken != 0) tell(group, account);
   }
 }
 
-void CreditBook::open(GroupId group, std::uint32_t window) {
-  if (group == GroupId{}) return;
+void CreditBook::open(GroupId group, std::uint32_t window, std::uint8_t number) {
+  if (window == 0) return forget(group);
   plain_.fill(0);
   const MutexLock lock(mutex_);
-  const auto found = accounts_.find(group.value());
-  if (found == accounts_.end() && window == 0 && accounts_.size() >= kAccountsMax) return;
-  Account& account = accounts_[group.value()];
-  if (window == 0 && account.state != State::counted) {
-    account = {State::plain, 0, 0, 0};
-    return;
-  }
+  const auto [place, fresh] = accounts_.try_emplace(group.value());
+  Account& account = place->second;
   account.window = window;
-  account.state = State::counted;
-  if (account.taken != account.told) tell(group.value(), account);
+  if (!fresh && account.number == number) return;
+  account.number = number;
+  restart(account);
 }
 
 void CreditBook::forget(GroupId group) {
-  plain_.fill(0);
   const MutexLock lock(mutex_);
   accounts_.erase(group.value());
 }
@@ -50,18 +39,7 @@ std::uint32_t CreditBook::epoch_for(std::uint32_t group) {
   if (plain == group) return 0;  // also for 0, which no group has
   const MutexLock lock(mutex_);
   const auto found = accounts_.find(group);
-  if (found == accounts_.end()) {
-    if (accounts_.size() >= kAccountsMax) {
-      // Of subscriptions that ended nobody tells. Plain ones that go on count early then, which
-      // nobody is told.
-      std::erase_if(accounts_,
-                    [](const auto& entry) { return entry.second.state != State::counted; });
-      if (accounts_.size() >= kAccountsMax) return 0;
-    }
-    accounts_.emplace(group, Account{});
-    return epoch_;
-  }
-  if (found->second.state != State::plain) return epoch_;
+  if (found != accounts_.end()) return found->second.epoch;
   plain = group;
   return 0;
 }
@@ -70,18 +48,21 @@ void CreditBook::take(std::uint32_t group, std::uint32_t epoch, std::uint32_t me
   if (epoch == 0) return;
   const MutexLock lock(mutex_);
   const auto found = accounts_.find(group);
-  if (found == accounts_.end() || epoch != epoch_) return;
+  if (found == accounts_.end() || epoch != found->second.epoch) return;
   Account& account = found->second;
-  if (account.state == State::plain) return;
   account.taken += messages;
-  if (account.state == State::early) return;
   const std::uint64_t enough = more ? std::max(1u, account.window / 2) : 1;
   if (account.taken - account.told >= enough) tell(group, account);
 }
 
+void CreditBook::restart(Account& account) {
+  account.epoch = ++epochs_;
+  account.taken = account.told = 0;
+}
+
 void CreditBook::tell(std::uint32_t group, Account& account) {
   // Not connected: the next WELCOME brings it.
-  if (outbound_.post(proto::flow::Credit{GroupId{group}, account.taken}))
+  if (outbound_.post(proto::flow::Credit{GroupId{group}, account.taken, account.number}))
     account.told = account.taken;
 }
 

@@ -35,8 +35,7 @@ void Declarations::enter_group(Service& service, GroupId group) {
   service.group = service.last_group = group;
 }
 
-void Declarations::add_service(const proto::ns::Advertise& service, GroupId group,
-                               std::vector<std::byte> proof) {
+void Declarations::add_service(const proto::ns::Advertise& service, GroupId group) {
   const MutexLock lock(mutex_);
   Service& own = services_[service.service];
   if (!same_stream(own.request, service)) {
@@ -44,9 +43,8 @@ void Declarations::add_service(const proto::ns::Advertise& service, GroupId grou
     own.last_due = false;
   }
   own.request = service;
-  own.proof = std::move(proof);
   enter_group(own, group);
-  outbound_.move_group({.former = 0, .now = group.value()});
+  outbound_.forget_moves(group.value());
   own.ended = false;
   if (service.retain) {
     outbound_.follow_retained(service.service, group.value());
@@ -60,7 +58,7 @@ void Declarations::remove_service(GroupId group) {
   std::erase_if(services_, [&](const auto& entry) {
     const bool ends = entry.second.group == group;
     if (ends) outbound_.forget_retained(entry.first);
-    if (ends) outbound_.forget_group(group.value());
+    if (ends) outbound_.forget_moves(group.value());
     return ends;
   });
 }
@@ -76,7 +74,7 @@ std::optional<GroupId> Declarations::end_service(const std::string& service) {
   const auto found = services_.find(service);
   if (found == services_.end() || found->second.ended) return std::nullopt;
   outbound_.forget_retained(service);
-  outbound_.forget_group(found->second.last_group.value());
+  outbound_.forget_moves(found->second.last_group.value());
   const GroupId group = found->second.group;
   found->second.ended = true;
   if (group == GroupId{} && !found->second.asked) services_.erase(found);
@@ -94,24 +92,36 @@ void Declarations::finish_service(const std::string& service, GroupId group) {
 
 void Declarations::add_subscription(const proto::ns::Subscribe& subscription, GroupId group) {
   const MutexLock lock(mutex_);
-  subscriptions_.insert_or_assign(subscription.name, Subscription{subscription, group});
+  beginning_.erase(subscription.name);
+  subscriptions_.insert_or_assign(subscription.name, Subscription{subscription, group, group});
 }
 
 std::optional<Declarations::Former> Declarations::begin_subscription(
-    const proto::ns::Subscribe& request) {
+    proto::ns::Subscribe& request) {
   const MutexLock lock(mutex_);
   const auto found = subscriptions_.find(request.name);
-  if (found == subscriptions_.end()) return std::nullopt;
+  if (found == subscriptions_.end()) {
+    beginning_[request.name] = request.number = next_number_++;
+    return std::nullopt;
+  }
+  request.number = found->second.ended ? next_number_++ : found->second.request.number;
   return Former{std::exchange(found->second.request, request),
                 std::exchange(found->second.ended, false)};
 }
 
-void Declarations::give_up_subscription(const Former& former, bool heard) {
+void Declarations::count_anew(proto::ns::Subscribe& request) {
   const MutexLock lock(mutex_);
-  const auto found = subscriptions_.find(former.request.name);
-  if (found == subscriptions_.end()) return;
-  if (heard) found->second.request = former.request;
-  found->second.ended |= former.ended;
+  request.number = next_number_++;
+}
+
+void Declarations::give_up_subscription(const std::string& full_name,
+                                        const std::optional<Former>& former, bool heard) {
+  const MutexLock lock(mutex_);
+  beginning_.erase(full_name);
+  const auto found = subscriptions_.find(full_name);
+  if (!former || found == subscriptions_.end()) return;
+  if (heard) found->second.request = former->request;
+  found->second.ended |= former->ended;
 }
 
 bool Declarations::end_subscription(const std::string& full_name) {
@@ -123,27 +133,27 @@ bool Declarations::end_subscription(const std::string& full_name) {
 void Declarations::finish_subscription(const std::string& full_name) {
   const MutexLock lock(mutex_);
   const auto found = subscriptions_.find(full_name);
-  if (found != subscriptions_.end() && found->second.ended) subscriptions_.erase(found);
+  if (found == subscriptions_.end() || !found->second.ended) return;
+  credits_.forget(found->second.group);
+  subscriptions_.erase(found);
 }
 
 bool Declarations::on_service_moved(const proto::ns::ServiceMoved& event) {
   const MutexLock lock(mutex_);
-  GroupId former = event.old_group;
-  bool ended = false;
-  if (const auto found = subscriptions_.find(event.name); found != subscriptions_.end()) {
-    former = std::exchange(found->second.group, event.new_group);
-    const bool news = former != event.new_group || (former == GroupId{} && !event.between.empty());
-    // What was counted since it came first must not be forgotten.
-    if (event.again && !news) return false;
-    ended = found->second.ended;
+  const auto found = subscriptions_.find(event.name);
+  if (found == subscriptions_.end()) {
+    // Its SUBSCRIBE was answered a moment ago, or is not yet.
+    const auto beginning = beginning_.find(event.name);
+    if (beginning != beginning_.end()) credits_.open(event.group, event.window, beginning->second);
+    return true;
   }
-  for (const GroupId gone : {event.old_group, former}) {
-    if (gone != event.new_group && !is_subscribed(gone)) credits_.forget(gone);
-  }
-  return !ended;
+  const GroupId former = std::exchange(found->second.group, event.group);
+  if (former != event.group && !is_subscribed(former)) credits_.forget(former);
+  credits_.open(event.group, event.window, found->second.request.number);
+  return !found->second.ended;
 }
 
-void Declarations::declare_again(bool forgotten) {
+void Declarations::declare_again(const Occasion& occasion) {
   services_due_.clear();
   subscriptions_due_.clear();
   under_way_ = 0;
@@ -152,13 +162,16 @@ void Declarations::declare_again(bool forgotten) {
     const MutexLock lock(mutex_);
     for (auto& [name, service] : services_) {
       services_due_.push_back(name);
-      service.last_due |= forgotten && service.request.retain;
+      service.last_due |= occasion.forgotten && service.request.retain;
     }
-    for (const auto& [name, subscription] : subscriptions_) subscriptions_due_.push_back(name);
+    for (auto& [name, subscription] : subscriptions_) {
+      subscriptions_due_.push_back(name);
+      subscription.former = subscription.group;
+      if (occasion.anew) subscription.request.number = next_number_++;
+    }
   }
   declaring_ = true;
-  outbound_.set_declaring(true);
-  if (services_due_.empty()) end_declaring();
+  outbound_.begin_declaring();
   go_on();
 }
 
@@ -176,7 +189,9 @@ void Declarations::go_on() {
 
 void Declarations::end_declaring() {
   declaring_ = false;
-  const std::uint64_t lost = outbound_.set_declaring(false);
+  const std::uint64_t lost = outbound_.readdress(moves());
+  bring_last_messages();
+  outbound_.end_declaring();
   if (lost == 0) return;
   const std::string reason = proto::drop_reason_name(proto::DropReason::no_such_group);
   Record* record = make_event(NIF_GAP, reason);
@@ -199,17 +214,10 @@ bool Declarations::declare_service(const std::string& service) {
   if (found == services_.end()) return true;  // withdrawn meanwhile
   Service& own = found->second;
   if (own.ended && !own.asked) return withdraw_service(service, own.group);
-  proto::ns::Advertise request = own.request;
-  // Also where the hub refused it meanwhile: it gave the group to nobody who could not prove that
-  // it was theirs.
-  if (own.last_group != GroupId{}) {
-    request.former_group = own.last_group;
-    request.former_proof = own.proof;
-  }
   const auto handler = [this, service, round = round_](const proto::Payload& payload) {
     if (round == round_) on_advertised(service, payload);
   };
-  if (!requests_.ask_later(proto::Kind::ns, proto::encode(request), handler)) return false;
+  if (!requests_.ask_later(proto::Kind::ns, proto::encode(own.request), handler)) return false;
   own.asked = true;
   ++under_way_;
   return true;
@@ -263,22 +271,33 @@ void Declarations::on_unsubscribed(const std::string& full_name, const proto::Pa
   answered();
 }
 
-/// What waits for the service goes where it is now.
-void Declarations::follow_group(Service& service) {
-  const GroupId former = service.last_group;
-  const bool reused = std::ranges::any_of(services_, [&](const auto& entry) {
-    return &entry.second != &service && entry.second.group == former;
-  });
-  outbound_.move_group({former.value(), service.group.value(), reused});
-  if (service.group != GroupId{}) enter_group(service, service.group);
+/// Where the own services are now that have or had a group, and those of others.
+SendQueue::GroupMap Declarations::moves() {
+  SendQueue::GroupMap moves;
+  const MutexLock lock(mutex_);
+  for (const auto& [name, subscription] : subscriptions_) {
+    if (subscription.former != GroupId{} && subscription.group != GroupId{})
+      moves[subscription.former.value()] = subscription.group.value();
+  }
+  for (auto& [name, service] : services_) {
+    if (service.last_group == GroupId{} || service.ended) continue;
+    moves[service.last_group.value()] = service.group.value();
+  }
+  for (auto& [name, service] : services_) {
+    if (service.group != GroupId{}) enter_group(service, service.group);
+  }
+  return moves;
 }
 
-/// Before answered(), which lets newer messages go: they are behind it in the queue.
-void Declarations::bring_last(const std::string& name, Service& service, bool moved) {
-  outbound_.follow_retained(name, service.group.value());
-  service.last_due |= moved;
-  if (service.group == GroupId{} || !std::exchange(service.last_due, false)) return;
-  outbound_.send_last_again(name);
+/// Newer messages wait until this is done: they come behind it in the queue.
+void Declarations::bring_last_messages() {
+  const MutexLock lock(mutex_);
+  for (auto& [name, service] : services_) {
+    if (!service.request.retain || service.ended) continue;
+    outbound_.follow_retained(name, service.group.value());
+    if (service.group != GroupId{} && std::exchange(service.last_due, false))
+      outbound_.send_last_again(name);
+  }
 }
 
 void Declarations::on_advertised(const std::string& service, const proto::Payload& payload) {
@@ -294,7 +313,6 @@ void Declarations::on_advertised(const std::string& service, const proto::Payloa
       provides =
           found->second.request.direction == proto::ns::Direction::provides && !found->second.ended;
       former = std::exchange(found->second.group, group);
-      if (answer) found->second.proof = answer->proof;
       found->second.asked = false;
       changed = former != group && !found->second.ended;
       if (found->second.ended && group == GroupId{}) {
@@ -302,8 +320,7 @@ void Declarations::on_advertised(const std::string& service, const proto::Payloa
       } else if (found->second.ended) {
         services_due_.push_back(service);
       } else {
-        follow_group(found->second);
-        if (found->second.request.retain) bring_last(service, found->second, changed);
+        found->second.last_due |= changed && found->second.request.retain;
       }
     }
   }
@@ -316,7 +333,7 @@ void Declarations::on_advertised(const std::string& service, const proto::Payloa
   }
   // Who came or went while this node was away, nobody told it.
   if (answer && provides) {
-    Record* record = make_event(NIF_SUBSCRIBER_JOINED, "");
+    Record* record = make_event(NIF_SUBSCRIBERS, "");
     record->incoming.group = group.value();
     record->incoming.count = answer->subscribers;
     events_.push_back(item_of(record, 0));
@@ -353,13 +370,8 @@ void Declarations::on_subscribed(const std::string& full_name, const proto::Payl
   }
   if (changed) {
     Record* record = make_event(NIF_SERVICE_MOVED, full_name);
-    record->incoming.former_group = former.value();
-    record->incoming.group = group.value();
     if (answer) {
-      record->incoming.message_type = answer->message_type;
-      record->incoming.instance = answer->instance;
-      record->incoming.delivery = static_cast<std::uint32_t>(answer->delivery);
-      record->incoming.direction = static_cast<std::uint32_t>(answer->direction);
+      put_service(record->incoming, *answer);
     } else {
       add_refusal(*record, answer.error());
     }

@@ -25,9 +25,7 @@ class Declarations {
   Declarations(RequestTable& requests, Outbound& outbound, CreditBook& credits)
       : requests_(requests), outbound_(outbound), credits_(credits) {}
 
-  /// `proof`: what the hub gave with the group, which the next connection shows to get it again.
-  void add_service(const proto::ns::Advertise& service, GroupId group, std::vector<std::byte> proof)
-      GIMNET_EXCLUDES(mutex_);
+  void add_service(const proto::ns::Advertise& service, GroupId group) GIMNET_EXCLUDES(mutex_);
   void remove_service(GroupId group) GIMNET_EXCLUDES(mutex_);
   /// The program is about to advertise a service of that name: one that ended is not withdrawn any
   /// more. True: there is such a one, which ends again where the hub does not take the new one.
@@ -48,24 +46,33 @@ class Declarations {
   };
   /// The program is about to subscribe to a service. One that is subscribed already is declared by
   /// the new terms from now on, and one that ended is not ended any more. Nothing: there was none.
-  [[nodiscard]] std::optional<Former> begin_subscription(const proto::ns::Subscribe& request)
+  /// Gives the request its count number.
+  [[nodiscard]] std::optional<Former> begin_subscription(proto::ns::Subscribe& request)
       GIMNET_EXCLUDES(mutex_);
+  /// The request gets another count number.
+  void count_anew(proto::ns::Subscribe& request) GIMNET_EXCLUDES(mutex_);
   /// The hub did not take what was begun. `heard`: it said so, and what there was goes on; else it
   /// may have taken it, and is asked with the next connection, unless the subscription had ended.
-  void give_up_subscription(const Former& former, bool heard) GIMNET_EXCLUDES(mutex_);
+  void give_up_subscription(const std::string& full_name, const std::optional<Former>& former,
+                            bool heard) GIMNET_EXCLUDES(mutex_);
   /// The subscription ends: it is declared no more, and the hub is told with the next connection if
   /// finish_subscription() does not come before. False: there is none, or it ended already.
   bool end_subscription(const std::string& full_name) GIMNET_EXCLUDES(mutex_);
   /// The hub does not have it (any more).
   void finish_subscription(const std::string& full_name) GIMNET_EXCLUDES(mutex_);
 
-  /// A new connection: declares everything again, a few requests at a time. GROUP messages wait
-  /// until the services are through. `forgotten`: what the hub kept of retained services may be
-  /// gone; it gets their last messages again, before newer ones.
-  void declare_again(bool forgotten) GIMNET_EXCLUDES(mutex_);
+  /// Why everything is declared again.
+  struct Occasion {
+    bool anew = false;       ///< a WELCOME that was not `resumed`: counts begin anew
+    bool forgotten = false;  ///< what the hub kept of retained services may be gone
+  };
+  /// Declares everything again, a few requests at a time. GROUP messages wait until that is
+  /// through; before newer ones a hub that forgot the last messages of retained services gets them
+  /// again.
+  void declare_again(const Occasion& occasion) GIMNET_EXCLUDES(mutex_);
   /// Goes on declaring where numbers for requests were short.
   void go_on() GIMNET_EXCLUDES(mutex_);
-  /// False: nothing new, as the event was told again at a return, and had come before.
+  /// False: nothing that the program waits for.
   [[nodiscard]] bool on_service_moved(const proto::ns::ServiceMoved& event) GIMNET_EXCLUDES(mutex_);
   /// What the last answer brought that the program should know. Takes the references along.
   [[nodiscard]] std::vector<Item> take_events();
@@ -80,8 +87,7 @@ class Declarations {
     GroupId group;
     GroupId last_group;  ///< while the hub refuses it: the one that it had before, unless another
                          ///< one has that
-    std::vector<std::byte> proof{};  ///< of that
-    bool last_due = false;           ///< retained, and the hub may not have the last message
+    bool last_due = false;  ///< retained, and the hub may not have the last message
     bool asked =
         false;  ///< an ADVERTISE of the library has no answer yet, on this connection or for ever
     bool ended = false;  ///< for the program, and the hub may still have it
@@ -89,6 +95,7 @@ class Declarations {
   struct Subscription {
     proto::ns::Subscribe request;
     GroupId group;
+    GroupId former;        ///< when it was declared last
     bool ended = false;    ///< for the program, and the hub may still have it
     bool refused = false;  ///< by the hub, when it was declared last
   };
@@ -106,9 +113,9 @@ class Declarations {
   [[nodiscard]] bool declare_subscription(const std::string& full_name) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] bool unsubscribe(const std::string& full_name) GIMNET_REQUIRES(mutex_);
   void enter_group(Service& service, GroupId group) GIMNET_REQUIRES(mutex_);
-  void follow_group(Service& service) GIMNET_REQUIRES(mutex_);
   void end_declaring();
-  void bring_last(const std::string& name, Service& service, bool moved) GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] SendQueue::GroupMap moves() GIMNET_EXCLUDES(mutex_);
+  void bring_last_messages() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] bool is_subscribed(GroupId group) const GIMNET_REQUIRES(mutex_);
   void answered();
 
@@ -120,6 +127,9 @@ class Declarations {
   std::map<std::string, Service> services_
       GIMNET_GUARDED_BY(mutex_);  ///< by their name within this node
   std::map<std::string, Subscription> subscriptions_ GIMNET_GUARDED_BY(mutex_);
+  /// Count numbers of subscriptions that the program begins. Limit: its threads.
+  std::map<std::string, std::uint8_t> beginning_ GIMNET_GUARDED_BY(mutex_);
+  std::uint8_t next_number_ GIMNET_GUARDED_BY(mutex_) = 0;
 
   // The library's thread.
   std::deque<std::string> services_due_;       ///< Limit: services_

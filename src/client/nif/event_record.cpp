@@ -44,4 +44,14 @@ Item item_of(Record* record, std::size_t bytes) {
   return {record, nullptr, 0, bytes + sizeof(Record), 0};
 }
 
+void put_service(nif_incoming& incoming, const proto::ns::ServiceState& state) {
+  incoming.group = state.group.value();
+  incoming.from = state.provider.value();
+  incoming.count = state.session;
+  incoming.message_type = state.message_type;
+  incoming.instance = state.instance;
+  incoming.delivery = static_cast<std::uint32_t>(state.delivery);
+  incoming.direction = static_cast<std::uint32_t>(state.direction);
+}
+
 }  // namespace gimnet::nif

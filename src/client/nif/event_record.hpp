@@ -5,6 +5,7 @@
 #include <string>
 
 #include "client/nif/storage.hpp"
+#include "proto/control/ns.hpp"
 #include "proto/frame/report.hpp"
 
 // What the receive queue holds beside messages. Thread safety: pure functions.
@@ -17,5 +18,8 @@ namespace gimnet::nif {
 [[nodiscard]] Record* make_report(const proto::Report& report, std::uint32_t from);
 /// Its place in the receive queue; the reference goes with it.
 [[nodiscard]] Item item_of(Record* record, std::size_t bytes);
+
+/// What an event says of a service.
+void put_service(nif_incoming& incoming, const proto::ns::ServiceState& state);
 
 }  // namespace gimnet::nif

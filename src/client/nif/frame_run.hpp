@@ -52,6 +52,15 @@ struct FrameRun {
     return front;
   }
 
+  /// Extends this run by `next` if that lies right behind it and is of the same sort.
+  bool extend(const FrameRun& next) {
+    if (chunk != next.chunk || end != next.begin || lane != next.lane || sort != next.sort)
+      return false;
+    end = next.end;
+    frames += next.frames;
+    return true;
+  }
+
   /// Takes as many frames as fit into `bytes_max`, at least one.
   FrameRun split_at_most(std::size_t bytes_max) {
     if (size() <= bytes_max) return split(size(), frames);

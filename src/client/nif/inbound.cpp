@@ -286,23 +286,10 @@ Inbound::Verdict Inbound::take_names(const proto::FrameView& view) {
   return Verdict::going;
 }
 
-void Inbound::add_moved(const proto::ns::ServiceMoved& event, GroupId from, GroupId to) {
+void Inbound::add_moved(const proto::ns::ServiceMoved& event) {
   Record* record = make_event(NIF_SERVICE_MOVED, event.name);
-  record->incoming.former_group = from.value();
-  record->incoming.group = to.value();
-  record->incoming.message_type = event.message_type;
-  record->incoming.instance = event.instance;
-  record->incoming.delivery = static_cast<std::uint32_t>(event.delivery);
-  record->incoming.direction = static_cast<std::uint32_t>(event.direction);
+  put_service(record->incoming, event);
   add_record(record, event.name.size());
-}
-
-void Inbound::add_subscriber(nif_incoming_type type, const proto::ns::SubscriberChange& change) {
-  Record* record = make_event(type, "");
-  record->incoming.group = change.group.value();
-  record->incoming.from = change.node.value();
-  record->incoming.count = change.subscribers;
-  add_record(record, 0);
 }
 
 Inbound::Verdict Inbound::take_event(const proto::ControlView& event,
@@ -311,23 +298,16 @@ Inbound::Verdict Inbound::take_event(const proto::ControlView& event,
     case proto::ns::Operation::service_moved: {
       const auto moved = proto::decode<proto::ns::ServiceMoved>(payload);
       if (!moved) return malformed(moved.error().sentence);
-      if (!host_.on_service_moved(*moved)) return Verdict::going;
-      GroupId from = moved->old_group;
-      for (const GroupId between : moved->between)
-        add_moved(*moved, std::exchange(from, between), between);
-      add_moved(*moved, from, moved->new_group);
+      if (host_.on_service_moved(*moved)) add_moved(*moved);
       return Verdict::going;
     }
-    case proto::ns::Operation::subscriber_joined: {
-      const auto joined = proto::decode<proto::ns::SubscriberJoined>(payload);
-      if (!joined) return malformed(joined.error().sentence);
-      add_subscriber(NIF_SUBSCRIBER_JOINED, *joined);
-      return Verdict::going;
-    }
-    case proto::ns::Operation::subscriber_left: {
-      const auto left = proto::decode<proto::ns::SubscriberLeft>(payload);
-      if (!left) return malformed(left.error().sentence);
-      add_subscriber(NIF_SUBSCRIBER_LEFT, *left);
+    case proto::ns::Operation::subscribers: {
+      const auto subscribers = proto::decode<proto::ns::Subscribers>(payload);
+      if (!subscribers) return malformed(subscribers.error().sentence);
+      Record* record = make_event(NIF_SUBSCRIBERS, "");
+      record->incoming.group = subscribers->group.value();
+      record->incoming.count = subscribers->subscribers;
+      add_record(record, 0);
       return Verdict::going;
     }
     case proto::ns::Operation::watch_events:

@@ -133,8 +133,7 @@ class Inbound {
   void add_events(std::span<const Item> events);
   [[nodiscard]] std::uint32_t epoch_of(const proto::FrameHeader& header);
   void add_gap(std::uint32_t from, std::uint64_t count, proto::DropReason reason);
-  void add_moved(const proto::ns::ServiceMoved& event, GroupId from, GroupId to);
-  void add_subscriber(nif_incoming_type type, const proto::ns::SubscriberChange& change);
+  void add_moved(const proto::ns::ServiceMoved& event);
   void deliver();
   void tell_taken(const std::vector<MessageAssembler::Notice>& notices);
 

@@ -188,8 +188,7 @@ nif_status nif_advertise(nif_node* node, const nif_service* service, uint32_t* g
     const bool ended = found.declarations().begin_service(request.service);
     const nif_status status = declare(found, [&] {
       const nif_status asked = ask(found, request, answer, "advertise", request.service, deadline);
-      if (asked == NIF_OK)
-        found.declarations().add_service(request, answer.group, std::move(answer.proof));
+      if (asked == NIF_OK) found.declarations().add_service(request, answer.group);
       return asked;
     });
     if (status != NIF_OK) {
@@ -269,14 +268,17 @@ nif_status nif_subscribe_paced(nif_node* node, const char* full_name, const nif_
     ns::SubscribeAnswer answer;
     const Deadline deadline = deadline_after(timeout_ms);
     const auto former = found.declarations().begin_subscription(request);
+    bool again = false;
     const nif_status status = declare(found, [&] {
+      // An answer that was lost with its connection began counts that this end does not know.
+      if (std::exchange(again, true)) found.declarations().count_anew(request);
       const nif_status asked = ask(found, request, answer, "subscribe to", full_name, deadline);
       if (asked == NIF_OK) found.declarations().add_subscription(request, answer.group);
       return asked;
     });
     if (status != NIF_OK) {
       const bool heard = status != NIF_TIMEOUT && status != NIF_NOT_CONNECTED;
-      if (former) found.declarations().give_up_subscription(*former, heard);
+      found.declarations().give_up_subscription(full_name, former, heard);
       return status;
     }
     if (subscription != nullptr) {
@@ -286,7 +288,9 @@ nif_status nif_subscribe_paced(nif_node* node, const char* full_name, const nif_
                        static_cast<std::uint32_t>(answer.delivery),
                        answer.window,
                        answer.retain ? 1u : 0u,
-                       static_cast<std::uint32_t>(answer.direction)};
+                       static_cast<std::uint32_t>(answer.direction),
+                       answer.provider.value(),
+                       answer.session};
     }
     return NIF_OK;
   });

@@ -102,7 +102,7 @@ bool Node::take_over(Admitted admitted, bool first) {
   stream_ = std::move(admitted.stream);
   const bool same_id = admitted.session.id == session_.id;
   session_ = std::move(admitted.session);
-  if (!first) outbound_.set_declaring(true);  // until declare_again() below knows better
+  if (!first) outbound_.begin_declaring();  // until declare_again() below knows better
   // Before anything can be posted: a total of the earlier connection would count as one of this.
   credits_.begin(session_.resumed);
   const auto let_go = outbound_.attach(*stream_, session_);
@@ -145,7 +145,7 @@ bool Node::take_over(Admitted admitted, bool first) {
   confirmed_ = inbound_.taken();
   behind_welcome_ = std::move(admitted.rest);
   if (!first) {
-    declarations_.declare_again(!session_.resumed || *let_go > 0);
+    declarations_.declare_again({!session_.resumed, !session_.resumed || *let_go > 0});
     received_.push(declarations_.take_events());
     watches_.declare_again();
   }
@@ -194,7 +194,7 @@ std::vector<Item> Node::on_answer(proto::Kind kind, const proto::ControlView& an
     store_le(payload.data(), answer.header.operation);
     payload.insert(payload.end(), answer.body.begin(), answer.body.end());
     const auto subscribed = proto::decode_answer<proto::ns::SubscribeAnswer>(payload);
-    if (subscribed) credits_.open(subscribed->group, subscribed->window);
+    if (subscribed) credits_.open(subscribed->group, subscribed->window, subscribed->number);
   }
   static_cast<void>(requests_.on_answer(kind, answer));
   std::vector<Item> events = declarations_.take_events();
@@ -204,9 +204,7 @@ std::vector<Item> Node::on_answer(proto::Kind kind, const proto::ControlView& an
 }
 
 bool Node::on_service_moved(const proto::ns::ServiceMoved& event) {
-  if (!declarations_.on_service_moved(event)) return false;
-  credits_.open(event.new_group, event.window);
-  return true;
+  return declarations_.on_service_moved(event);
 }
 
 bool Node::on_watch_events(const proto::ns::WatchEvents& events) {
@@ -252,7 +250,7 @@ void Node::take_new_name() {
   // use it.
   tokens_.rename(name_);
   keep_token();
-  declarations_.declare_again(false);  // services have other groups then, which tells
+  declarations_.declare_again({});  // services have other groups then, which tells
 }
 
 void Node::on_taken(std::uint32_t from, const proto::Taken& taken) {

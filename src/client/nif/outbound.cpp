@@ -215,35 +215,55 @@ void Outbound::send_last_again(const std::string& service) {
   write_or_leave(false);
 }
 
-std::uint64_t Outbound::set_declaring(bool declaring) {
+void Outbound::begin_declaring() {
   const MutexLock lock(mutex_);
-  declaring_ = declaring;
-  if (declaring) {
-    moves_.begin();
-    return 0;
-  }
-  const std::uint64_t lost = queue_.drop_parked();
-  lost_ |= lost > 0;
-  notify_waiting();
-  if (!held_.empty()) write_or_leave(false);
-  return lost;
+  declaring_ = true;
 }
 
-void Outbound::move_group(const GroupMoves::Move& move) {
+std::uint64_t Outbound::readdress(const SendQueue::GroupMap& moves) {
   const MutexLock lock(mutex_);
-  moves_.add(move);
-  if (move.former == 0 || move.now == 0) return;
+  for (auto& [former, now] : moves_) {
+    if (const auto moved = moves.find(now); now != 0 && moved != moves.end()) now = moved->second;
+  }
+  for (const auto& [former, now] : moves) {
+    if (former != now) moves_[former] = now;
+  }
+  for (const auto& [former, now] : moves) {
+    if (now != 0) moves_.erase(now);
+  }
+  std::uint64_t lost = 0;
   try {
-    if (queue_.release_group(move.former, move.now)) write_or_leave(false);
+    if (queue_.held_back()) lost = queue_.go_on(moves);
   } catch (const std::bad_alloc&) {
     no_memory_ = true;
     throw;
   }
+  lost_ |= lost > 0;
+  return lost;
 }
 
-void Outbound::forget_group(std::uint32_t group) {
+void Outbound::end_declaring() {
   const MutexLock lock(mutex_);
-  moves_.forget(group);
+  declaring_ = false;
+  notify_waiting();
+  write_or_leave(false);
+}
+
+void Outbound::forget_moves(std::uint32_t group) {
+  const MutexLock lock(mutex_);
+  moves_.erase(group);
+  std::erase_if(moves_, [group](const auto& entry) { return entry.second == group; });
+}
+
+void Outbound::redirect(Outgoing& message) const {
+  if (moves_.empty() || !message.is_group()) return;
+  const auto moved = moves_.find(message.parts().header.dst);
+  if (moved != moves_.end() && moved->second != 0) message.redirect(moved->second);
+}
+
+bool Outbound::refuses(std::uint32_t group) const {
+  const auto moved = moves_.find(group);
+  return group == 0 || (moved != moves_.end() && moved->second == 0);
 }
 
 std::uint32_t Outbound::waiting() {
@@ -334,7 +354,7 @@ void Outbound::add_counters(nif_counters& counters) {
   counters.bytes_sent = bytes_sent_;
   counters.write_calls = write_calls_;
   counters.pauses = pause_count_;
-  counters.send_queue_bytes = queue_.unsent_bytes() + queue_.parked_bytes() + held_.bytes();
+  counters.send_queue_bytes = queue_.unsent_bytes() + held_.bytes();
   counters.retained_bytes = queue_.retained_bytes();
   counters.last_messages_not_kept = last_.not_kept();
 }

@@ -11,7 +11,6 @@
 
 #include "base/mutex.hpp"
 #include "client/nif/error.hpp"
-#include "client/nif/group_moves.hpp"
 #include "client/nif/held_messages.hpp"
 #include "client/nif/last_messages.hpp"
 #include "client/nif/outgoing.hpp"
@@ -67,7 +66,7 @@ class Outbound {
 
   // The library's thread.
   /// The connection stands. Returns what SKIP has to announce; nothing: the hub's count is
-  /// impossible, and it is not attached. May throw std::bad_alloc, as may move_group(): then
+  /// impossible, and it is not attached. May throw std::bad_alloc, as may readdress(): then
   /// detach() must follow.
   [[nodiscard]] std::optional<std::uint64_t> attach(net::Stream& stream, const Session& session)
       GIMNET_EXCLUDES(mutex_);
@@ -101,14 +100,17 @@ class Outbound {
   /// Sends the last message of a retained service, of which the hub may know nothing, behind what
   /// waits in its lane, unless a newer one goes on that had begun. Does not wait for room.
   void send_last_again(const std::string& service) GIMNET_EXCLUDES(mutex_);
-  /// GROUP messages wait until the services are declared again. Returns how many frames that had
-  /// been accepted before a break have no service any more, and are lost.
-  std::uint64_t set_declaring(bool declaring) GIMNET_EXCLUDES(mutex_);
-  /// An own service has another group, or (`now` 0) none: what waits for it goes there, and so does
-  /// what a program still sends to the former one.
-  void move_group(const GroupMoves::Move& move) GIMNET_EXCLUDES(mutex_);
-  /// The own service that has the group ended.
-  void forget_group(std::uint32_t group) GIMNET_EXCLUDES(mutex_);
+  /// GROUP messages wait until end_declaring().
+  void begin_declaring() GIMNET_EXCLUDES(mutex_);
+  /// The services are declared again, and have these groups now, by their former ones (0: the hub
+  /// refuses the service): what waits for them goes there, and so does what a program still sends
+  /// to a former one. Returns how many frames that had been accepted before a break have no service
+  /// any more, and are lost.
+  std::uint64_t readdress(const SendQueue::GroupMap& moves) GIMNET_EXCLUDES(mutex_);
+  /// GROUP messages go on.
+  void end_declaring() GIMNET_EXCLUDES(mutex_);
+  /// An own service has that group from now on, or had it until now.
+  void forget_moves(std::uint32_t group) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::uint32_t id() GIMNET_EXCLUDES(mutex_);
 
   void on_pause(const proto::flow::Target& target) GIMNET_EXCLUDES(mutex_);
@@ -148,6 +150,9 @@ class Outbound {
   [[nodiscard]] nif_status put_piece(Outgoing& message, SendProgress& progress,
                                      proto::Fragmenter& fragmenter) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] std::uint32_t piece_max(const Outgoing& message) const GIMNET_REQUIRES(mutex_);
+  void redirect(Outgoing& message) const GIMNET_REQUIRES(mutex_);
+  /// The hub refuses the service whose group that is or was.
+  [[nodiscard]] bool refuses(std::uint32_t group) const GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status wait_for_turn(Outgoing& message, std::size_t frame_size,
                                          const SendProgress* own, Deadline deadline)
       GIMNET_REQUIRES(mutex_);
@@ -227,7 +232,9 @@ class Outbound {
       GIMNET_GUARDED_BY(mutex_);  ///< Session::retained_bytes_max
   std::uint32_t waiting_ GIMNET_GUARDED_BY(mutex_) = 0;
   bool declaring_ GIMNET_GUARDED_BY(mutex_) = false;
-  GroupMoves moves_ GIMNET_GUARDED_BY(mutex_);
+  /// Groups of own services that a program may not know yet, by former ones; 0: refused. Limit: own
+  /// services, and former groups that a program was told of.
+  SendQueue::GroupMap moves_ GIMNET_GUARDED_BY(mutex_);
 
   bool writing_ GIMNET_GUARDED_BY(mutex_) = false;  ///< somebody is between gather() and commit()
   bool full_ GIMNET_GUARDED_BY(mutex_) = false;     ///< the kernel took less than was offered

@@ -27,7 +27,7 @@ bool Outbound::put_held(HeldMessage& held) {
   while (!held.fragmenter.done()) {
     if (held.progress.lost(epochs_)) return true;
     if (!has_room(message, frame, &held.progress)) return false;
-    const bool refused = message.is_group() && moves_.refuses(message.parts().header.dst);
+    const bool refused = message.is_group() && refuses(message.parts().header.dst);
     if (refused || put_piece(message, held.progress, held.fragmenter) != NIF_OK) {
       lost_ = true;
       return true;
@@ -114,8 +114,7 @@ void Outbound::detach(bool again) {
     no_memory_ = true;
   }
   if (!again || !queue_.resume() || no_memory_) {
-    lost_ |= no_memory_ || !queue_.all_written() || queue_.parked_bytes() > 0 ||
-             queue_.retained_bytes() > 0;
+    lost_ |= no_memory_ || !queue_.all_written() || queue_.retained_bytes() > 0;
     static_cast<void>(queue_.drop_all());
     drop_held();
     no_memory_ = false;
@@ -136,6 +135,8 @@ void Outbound::begin_leaving(std::uint64_t taken, std::span<const std::byte> goo
   if (taken != 0) static_cast<void>(put_flow(proto::flow::Confirm{taken}));
   goodbye_.assign(goodbye.begin(), goodbye.end());
   leaving_ = true;
+  // Nobody hears where the services are now.
+  if (queue_.held_back()) lost_ |= queue_.go_on({}) > 0;
 }
 
 bool Outbound::write_last() {

@@ -178,12 +178,10 @@ void Outbound::probe(const SendProgress& own) {
 nif_status Outbound::wait_for_turn(Outgoing& message, std::size_t frame_size,
                                    const SendProgress* own, Deadline deadline) {
   if (own != nullptr) return wait_until_it_may_go(message, frame_size, own, deadline);
-  if (!message.is_group()) return wait_until_it_may_go(message, frame_size, own, deadline);
-  moves_.redirect(message);
-  if (!moves_.refuses(message.parts().header.dst) && may_go(message, frame_size, own))
-    return NIF_OK;
-  const GroupMoves::Turn turn(moves_, message);
-  return wait_until_it_may_go(message, frame_size, own, deadline);
+  redirect(message);
+  const nif_status status = wait_until_it_may_go(message, frame_size, own, deadline);
+  redirect(message);  // its service may have another group since it waits
+  return status;
 }
 
 nif_status Outbound::wait_until_it_may_go(const Outgoing& message, std::size_t frame_size,
@@ -196,7 +194,7 @@ nif_status Outbound::wait_until_it_may_go(const Outgoing& message, std::size_t f
       if (const nif_status status = check_progress(*own); status != NIF_OK) return status;
     }
     const bool settled = state_ == State::connected && !declaring_;
-    if (settled && message.is_group() && moves_.refuses(message.parts().header.dst)) {
+    if (settled && message.is_group() && refuses(message.parts().header.dst)) {
       return fail(NIF_REFUSED,
                   "the hub did not take the service again, after a break or another name");
     }
@@ -378,8 +376,7 @@ nif_status Outbound::drain(Deadline deadline) {
                   "the connection was lost before everything was confirmed; some of it may not "
                   "have arrived");
     }
-    const bool nothing_waits =
-        all_sent() && queue_.parked_bytes() == 0 && held_.empty() && !writing_;
+    const bool nothing_waits = all_sent() && held_.empty() && !writing_;
     if (nothing_waits && queue_.retained_bytes() == 0) return NIF_OK;
     if (write_here() || ask_for_confirm()) continue;
     if (deadline != kNever && steady_now_ns() >= deadline) {

@@ -16,7 +16,7 @@ constexpr std::size_t kTurnBytes = 16 * 1024;
 constexpr std::size_t kPassedOverMax = 15 * kTurnBytes;
 
 /// False: no memory, and nothing changed.
-bool push(ParkedFrames::Runs& runs, FrameRun run) noexcept {
+bool push(SendQueue::Runs& runs, FrameRun run) noexcept {
   try {
     runs.push_back(std::move(run));
     return true;
@@ -163,7 +163,7 @@ std::span<const iovec> SendQueue::gather() {
   stage_first(control_);
   stage_first(resend_);
   // Frames of the lanes are counted after all that is sent again.
-  if (resend_.empty()) stage_lanes();
+  if (resend_.empty() && !held_back_) stage_lanes();
   std::size_t count = 0;
   std::size_t skip = first_written_;
   for (const FrameRun& run : staged_) {
@@ -260,15 +260,6 @@ std::optional<std::uint64_t> SendQueue::resume_from(std::uint64_t peer_taken) {
   return missing;
 }
 
-void SendQueue::set_source(std::uint32_t src) {
-  const auto change = [src](FrameRun& run) {
-    run.change_headers([src](proto::FrameHeader& header) { header.src = src; });
-  };
-  std::for_each(resend_.begin(), resend_.end(), change);
-  for (Runs& runs : lanes_) std::for_each(runs.begin(), runs.end(), change);
-  parked_.set_source(src);
-}
-
 void SendQueue::restart(std::uint32_t src) {
   retained_.restart();
   for (FrameRun& run : resend_) run.sort = FrameRun::Sort::data;
@@ -283,20 +274,44 @@ void SendQueue::restart(std::uint32_t src) {
   for (Runs& runs : lanes_) {
     for (FrameRun& run : runs) run.sort = FrameRun::Sort::data;
   }
-  const std::size_t parked_before = parked_.bytes();
-  parked_.take_from(lanes_);
-  unsent_bytes_ -= parked_.bytes() - parked_before;
-  set_source(src);
+  const auto change = [src](FrameRun& run) {
+    run.change_headers([src](proto::FrameHeader& header) { header.src = src; });
+  };
+  for (Runs& runs : lanes_) std::for_each(runs.begin(), runs.end(), change);
+  held_back_ = unsent_bytes_ > 0;
 }
 
-bool SendQueue::release_group(std::uint32_t former, std::uint32_t now) {
-  const std::size_t bytes = parked_.give_back(former, now, lanes_);
-  unsent_bytes_ += bytes;
-  return bytes > 0;
+std::uint64_t SendQueue::go_on(const GroupMap& moves) {
+  held_back_ = false;
+  latest_.clear();  // runs change their places
+  std::uint64_t dropped = 0;
+  for (Runs& lane : lanes_) {
+    Runs kept;
+    for (FrameRun& run : lane) {
+      while (run.frames > 0) {
+        FrameRun frame = run.split(run.first_size(), 1);
+        frame.sort = FrameRun::Sort::data;
+        const proto::FrameHeader header = frame.first_header();
+        const bool grouped = header.kind == proto::Kind::group;
+        const auto moved =
+            grouped || header.kind == proto::Kind::service ? moves.find(header.dst) : moves.end();
+        if (moved == moves.end() ? grouped : moved->second == 0) {
+          unsent_bytes_ -= frame.size();
+          ++dropped;
+          continue;
+        }
+        if (moved != moves.end())
+          frame.change_headers([&](proto::FrameHeader& each) { each.dst = moved->second; });
+        if (kept.empty() || !kept.back().extend(frame)) kept.push_back(std::move(frame));
+      }
+    }
+    lane.swap(kept);
+  }
+  return dropped;
 }
 
 std::uint64_t SendQueue::drop_all() noexcept {
-  std::uint64_t frames = parked_.drop();
+  std::uint64_t frames = 0;
   for (const FrameRun& run : staged_) frames += run.counted() ? run.frames : 0;
   staged_.clear();
   staged_bytes_ = 0;
@@ -309,6 +324,7 @@ std::uint64_t SendQueue::drop_all() noexcept {
     runs.clear();
   }
   latest_.clear();
+  held_back_ = false;
   retained_.restart();
   unsent_bytes_ = 0;
   return frames;

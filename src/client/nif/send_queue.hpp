@@ -12,7 +12,6 @@
 
 #include "client/nif/chunk_pool.hpp"
 #include "client/nif/frame_run.hpp"
-#include "client/nif/parked_frames.hpp"
 #include "client/nif/retained_frames.hpp"
 #include "proto/frame/frame_header.hpp"
 
@@ -36,6 +35,7 @@ struct LatestStream {
 /// brings again after a reconnect.
 class SendQueue {
  public:
+  using Runs = std::deque<FrameRun>;  ///< Limit: has_room(), and what LastMessages keeps
   struct Limits {
     std::size_t queue_bytes = 256 * 1024;
     std::size_t retained_bytes = 512 * 1024;
@@ -76,8 +76,6 @@ class SendQueue {
 
   /// Bytes that wait to be written.
   [[nodiscard]] std::size_t unsent_bytes() const { return unsent_bytes_; }
-  /// Bytes that wait for their services to be declared again.
-  [[nodiscard]] std::size_t parked_bytes() const { return parked_.bytes(); }
   [[nodiscard]] std::size_t retained_bytes() const { return retained_.bytes(); }
   [[nodiscard]] bool all_written() const { return unsent_bytes_ == 0; }
   [[nodiscard]] std::uint64_t frames_written() const { return frames_written_; }
@@ -95,17 +93,16 @@ class SendQueue {
   /// Returns how many frames were let go and are to be announced by SKIP; nothing: the count is
   /// impossible.
   [[nodiscard]] std::optional<std::uint64_t> resume_from(std::uint64_t peer_taken);
-  /// A new epoch under this node id: counts begin at 0, unconfirmed frames go, those that wait
-  /// stay; GROUP frames are parked until their services are declared again.
+  /// A new epoch under this node id: counts begin at 0, unconfirmed frames go, those that wait stay
+  /// where they are until go_on().
   void restart(std::uint32_t src);
-  /// The service that had the group `former` has `now`: what is parked for it goes, before what
-  /// waits in its lane. False: there is nothing.
-  bool release_group(std::uint32_t former, std::uint32_t now);
-  /// What is parked has no service any more. Returns how many frames.
-  std::uint64_t drop_parked() { return parked_.drop(); }
-  /// All that goes out from now on, again or for the first time, is from this node id. After
-  /// resume_from().
-  void set_source(std::uint32_t src);
+  /// The services are declared again: what waits goes where each of them is now, by its former
+  /// group, 0: nowhere. GROUP frames for others go nowhere, too. Returns how many those are. May
+  /// throw std::bad_alloc.
+  using GroupMap = std::unordered_map<std::uint32_t, std::uint32_t>;
+  [[nodiscard]] std::uint64_t go_on(const GroupMap& moves);
+  /// Since restart() and until go_on() nothing of the lanes goes.
+  [[nodiscard]] bool held_back() const { return held_back_; }
   /// Everything that waits and everything unconfirmed goes. Returns frames that waited.
   std::uint64_t drop_all() noexcept;
 
@@ -120,9 +117,6 @@ class SendQueue {
     std::shared_ptr<Chunk> chunk;
     std::size_t begin = 0;
   };
-  using Runs =
-      ParkedFrames::Runs;  ///< Limit: has_room(), what LastMessages keeps, and what was parked
-
   [[nodiscard]] Place allocate(std::size_t size) noexcept;
   [[nodiscard]] std::optional<std::uint8_t> pick_lane() const;
   void stage(Runs& from, std::size_t bytes_max);
@@ -133,18 +127,17 @@ class SendQueue {
 
   const Limits limits_;
   bool resume_ = false;
+  bool held_back_ = false;  ///< the lanes wait for go_on()
 
   ChunkPool pool_;
   std::shared_ptr<Chunk> open_chunk_;
   Runs control_;
   Runs resend_;  ///< written on an earlier connection, or cut by a break: in the order of their
                  ///< counts
-  ParkedFrames::Lanes lanes_;
+  std::array<Runs, proto::kLaneCount> lanes_;
   std::array<std::size_t, proto::kLaneCount>
       passed_over_{};  ///< bytes that went while the lane waited
   std::unordered_map<LatestStream, FrameRun*, StreamHash> latest_;
-
-  ParkedFrames parked_;
 
   Runs staged_;                    ///< gathered; outside a write at most the rest of one frame
   std::size_t staged_bytes_ = 0;   ///< without what was written of the first

@@ -160,12 +160,8 @@ proto::Welcome Conductor::welcome(const Session& session, const proto::Hello& he
 void Conductor::on_event(ShardEvent event, milliseconds now) {
   if (const auto* frame = std::get_if<ControlFrameEvent>(&event.what)) {
     on_frame(*frame, now);
-  } else if (const auto* read = std::get_if<MovesReadEvent>(&event.what)) {
-    on_moves_read(*read);
   } else if (const auto* detached = std::get_if<DetachedEvent>(&event.what)) {
     on_detached(*detached, now);
-  } else if (const auto* passed = std::get_if<FencePassedEvent>(&event.what)) {
-    runner_.fence_passed(*passed);
   } else if (std::holds_alternative<DrainedEvent>(event.what) && shards_to_drain_ > 0) {
     --shards_to_drain_;
   }
@@ -215,6 +211,7 @@ void Conductor::on_frame(const ControlFrameEvent& event, milliseconds now) {
   command.attachment = event.attachment;
   command.frame = control_frame(kind, event.node, facts_.id, answer);
   command.answers = 1;
+  command.counts = context.counts;
   wiring_.shards.send(shard, std::move(command));
   if (is_odd(status)) on_oddity(event, now);
 }
@@ -228,12 +225,6 @@ void Conductor::on_oddity(const ControlFrameEvent& event, milliseconds now) {
         "more than " + std::to_string(limits_.oddities_burst) +
             " requests were answered bad_request, not_supported or denied in a short time; look at "
             "the answers");
-}
-
-void Conductor::on_moves_read(const MovesReadEvent& event) {
-  const Session* session = find(event.session, event.node);
-  if (session == nullptr || event.attachment != session->attachment) return;
-  membership_.services().moves_read(session->index, event.move);
 }
 
 void Conductor::on_detached(const DetachedEvent& event, milliseconds now) {

@@ -100,7 +100,6 @@ class Conductor final : private Administration {
   /// Closes a connection that asks too often for what it cannot have.
   void on_oddity(const ControlFrameEvent& event, std::chrono::milliseconds now);
   /// The node has read the WELCOME of that connection.
-  void on_moves_read(const MovesReadEvent& event);
   void on_detached(const DetachedEvent& event, std::chrono::milliseconds now);
   void close(const Session& session, proto::GoodbyeCode code, std::string sentence);
   /// The session that the event is about, if it is still the same one.

@@ -123,8 +123,6 @@ struct ConductorLoop::Impl {
     wiring.inbox.drain_present([this](ShardEvent&& event) {
       if (auto* farewell = std::get_if<FarewellEvent>(&event.what)) {
         leaving.push_back(std::move(farewell->transport));
-      } else if (std::holds_alternative<FencePassedEvent>(event.what)) {
-        wiring.conductor.on_event(std::move(event), now());
       } else {
         turns.put(std::move(event));
       }

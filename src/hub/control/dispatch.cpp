@@ -21,7 +21,7 @@ namespace ctrl = proto::ctrl;
 
 enum Roles : std::uint8_t { nodes = 1, admins = 2, everybody = nodes | admins };
 
-struct Entry {
+struct TableRow {
   Kind kind;
   std::uint16_t operation;
   Roles roles;
@@ -29,28 +29,28 @@ struct Entry {
 };
 
 constexpr std::array kTable{
-    Entry{Kind::ns, ns::RegisterName::kOperation, everybody, handle_register},
-    Entry{Kind::ns, ns::UnregisterName::kOperation, everybody, handle_unregister},
-    Entry{Kind::ns, ns::Resolve::kOperation, everybody, handle_resolve},
-    Entry{Kind::ns, ns::Reverse::kOperation, everybody, handle_reverse},
-    Entry{Kind::ns, ns::List::kOperation, everybody, handle_list},
-    Entry{Kind::ns, ns::Advertise::kOperation, everybody, handle_advertise},
-    Entry{Kind::ns, ns::Withdraw::kOperation, everybody, handle_withdraw},
-    Entry{Kind::ns, ns::Services::kOperation, everybody, handle_services},
-    Entry{Kind::ns, ns::Subscribe::kOperation, everybody, handle_subscribe},
-    Entry{Kind::ns, ns::Unsubscribe::kOperation, everybody, handle_unsubscribe},
-    Entry{Kind::ns, ns::Watch::kOperation, everybody, handle_watch},
-    Entry{Kind::ns, ns::Unwatch::kOperation, everybody, handle_unwatch},
-    Entry{Kind::ns, ns::WatchTaken::kOperation, everybody, handle_watch_taken},
-    Entry{Kind::ctrl, ctrl::HubInfo::kOperation, everybody, handle_hub_info},
-    Entry{Kind::ctrl, ctrl::Statistics::kOperation, everybody, handle_statistics},
-    Entry{Kind::ctrl, ctrl::Connections::kOperation, everybody, handle_connections},
-    Entry{Kind::ctrl, ctrl::Routes::kOperation, everybody, handle_routes},
-    Entry{Kind::ctrl, ctrl::Kick::kOperation, admins, handle_kick},
-    Entry{Kind::ctrl, ctrl::Reassign::kOperation, admins, handle_reassign},
-    Entry{Kind::ctrl, ctrl::Drain::kOperation, admins, handle_drain},
-    Entry{Kind::ctrl, ctrl::Reload::kOperation, admins, handle_reload},
-    Entry{Kind::ctrl, ctrl::SetLogLevel::kOperation, admins, handle_log_level},
+    TableRow{Kind::ns, ns::RegisterName::kOperation, everybody, handle_register},
+    TableRow{Kind::ns, ns::UnregisterName::kOperation, everybody, handle_unregister},
+    TableRow{Kind::ns, ns::Resolve::kOperation, everybody, handle_resolve},
+    TableRow{Kind::ns, ns::Reverse::kOperation, everybody, handle_reverse},
+    TableRow{Kind::ns, ns::List::kOperation, everybody, handle_list},
+    TableRow{Kind::ns, ns::Advertise::kOperation, everybody, handle_advertise},
+    TableRow{Kind::ns, ns::Withdraw::kOperation, everybody, handle_withdraw},
+    TableRow{Kind::ns, ns::Services::kOperation, everybody, handle_services},
+    TableRow{Kind::ns, ns::Subscribe::kOperation, everybody, handle_subscribe},
+    TableRow{Kind::ns, ns::Unsubscribe::kOperation, everybody, handle_unsubscribe},
+    TableRow{Kind::ns, ns::Watch::kOperation, everybody, handle_watch},
+    TableRow{Kind::ns, ns::Unwatch::kOperation, everybody, handle_unwatch},
+    TableRow{Kind::ns, ns::WatchTaken::kOperation, everybody, handle_watch_taken},
+    TableRow{Kind::ctrl, ctrl::HubInfo::kOperation, everybody, handle_hub_info},
+    TableRow{Kind::ctrl, ctrl::Statistics::kOperation, everybody, handle_statistics},
+    TableRow{Kind::ctrl, ctrl::Connections::kOperation, everybody, handle_connections},
+    TableRow{Kind::ctrl, ctrl::Routes::kOperation, everybody, handle_routes},
+    TableRow{Kind::ctrl, ctrl::Kick::kOperation, admins, handle_kick},
+    TableRow{Kind::ctrl, ctrl::Reassign::kOperation, admins, handle_reassign},
+    TableRow{Kind::ctrl, ctrl::Drain::kOperation, admins, handle_drain},
+    TableRow{Kind::ctrl, ctrl::Reload::kOperation, admins, handle_reload},
+    TableRow{Kind::ctrl, ctrl::SetLogLevel::kOperation, admins, handle_log_level},
 };
 
 Roles mask_of(Role role) { return role == Role::admin ? admins : nodes; }
@@ -64,7 +64,7 @@ proto::Payload handle_unknown(HandlerContext&, const Request& request) {
 }  // namespace
 
 Handler handler_for(Role role, Kind kind, std::uint16_t operation) {
-  for (const Entry& entry : kTable) {
+  for (const TableRow& entry : kTable) {
     if (entry.kind != kind || entry.operation != operation) continue;
     return (entry.roles & mask_of(role)) != 0 ? entry.handler : handle_denied;
   }

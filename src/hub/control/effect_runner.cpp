@@ -1,9 +1,10 @@
 #include "hub/control/effect_runner.hpp"
 
-#include <algorithm>
+#include <map>
 #include <utility>
 
 #include "hub/control/change_log.hpp"
+#include "hub/control/state/records.hpp"
 #include "hub/shard/control_frame.hpp"
 #include "proto/control/ns_register.hpp"
 
@@ -15,9 +16,7 @@ namespace ns = proto::ns;
 
 }  // namespace
 
-GroupId EffectRunner::group_id(GroupIndex group) const {
-  return group == kNoGroup ? GroupId{} : make_id(parts_.facts.id, group);
-}
+GroupId EffectRunner::group_id(GroupIndex group) const { return make_id(parts_.facts.id, group); }
 
 void EffectRunner::carry_out(const Effects& effects, milliseconds now) {
   // First what has to outlive a crash, and once for all of them: what follows is seen by others.
@@ -53,27 +52,16 @@ void EffectRunner::run(const NodeChanged& effect) {
 }
 
 void EffectRunner::run(const GroupChanged& effect) {
-  if (parts_.membership.services().find_group(effect.index) != nullptr) {
-    endings_.finish(effect.index);
-    return parts_.publisher.publish_group(effect.index, parts_.membership);
-  }
-  if (endings_.contains(effect.index)) return;
-  // Not cleared at once: its last frames may still be on their way to other shards.
-  if (const auto provider_shard = parts_.publisher.end_group(effect.index)) {
-    endings_.begin(effect.index, *provider_shard);
-  }
+  parts_.publisher.publish_group(effect.index, parts_.membership);
+}
+
+void EffectRunner::run(const ProviderChanged& effect) {
+  parts_.publisher.publish_provider(effect.index, parts_.membership);
 }
 
 void EffectRunner::run(const MemberChanged& effect) {
   if (!parts_.publisher.publish_member(effect.group, effect.subscriber, parts_.membership)) {
     run(GroupChanged{effect.group});
-  }
-}
-
-void EffectRunner::fence_passed(const FencePassedEvent& event) {
-  for (const GroupIndex group : endings_.on_passed(event)) {
-    parts_.publisher.clear_group(group);
-    endings_.finish(group);
   }
 }
 
@@ -89,49 +77,53 @@ void EffectRunner::run(const RenumberDue& effect) {
                                      effect.sentence});
 }
 
-void EffectRunner::run(const ServiceMovedDue& effect) {
-  const auto frame = control_frame(proto::Kind::ns, NodeId{}, parts_.facts.id, payload_of(effect));
-  std::vector<std::vector<TellCommand::To>> by_shard(parts_.shards.shards());
-  const auto tell = [&](std::size_t shard) {
-    TellCommand command{std::exchange(by_shard[shard], {}), frame, effect.move};
-    parts_.shards.send(ShardIndex{static_cast<std::uint8_t>(shard)}, std::move(command));
+/// One frame for all that have the same window.
+void EffectRunner::run(const ServiceMoved& effect) {
+  const Topic* topic = parts_.membership.services().find(effect.full_name);
+  if (topic == nullptr) return;
+  std::map<std::uint32_t, std::vector<std::vector<TellCommand::To>>> by_window;
+  const auto frame = [&](std::uint32_t window) {
+    return control_frame(proto::Kind::ns, NodeId{}, parts_.facts.id, payload_of(*topic, window));
   };
-  for (const NodeIndex subscriber : effect.subscribers) {
+  const auto tell = [&](std::uint32_t window, std::size_t shard, std::vector<TellCommand::To>& to) {
+    parts_.shards.send(ShardIndex{static_cast<std::uint8_t>(shard)},
+                       TellCommand{std::exchange(to, {}), frame(window)});
+  };
+  for (const NodeIndex subscriber : topic->subscribers) {
     const Session* session = find(subscriber);
     // When it is back it is told by tell_again().
     if (session == nullptr || !session->connected) continue;
+    const std::uint32_t window = topic->window_of(subscriber);
+    auto& by_shard = by_window[window];
+    by_shard.resize(parts_.shards.shards());
     const std::size_t shard = session->place.shard.value();
     by_shard[shard].push_back(
         {ref_of(session->place), parts_.membership.sessions().node_id(*session)});
-    if (by_shard[shard].size() == TellCommand::kToMost) tell(shard);
+    if (by_shard[shard].size() == TellCommand::kToMost) tell(window, shard, by_shard[shard]);
   }
-  for (std::size_t shard = 0; shard < by_shard.size(); ++shard) {
-    if (!by_shard[shard].empty()) tell(shard);
+  for (auto& [window, by_shard] : by_window) {
+    for (std::size_t shard = 0; shard < by_shard.size(); ++shard) {
+      if (!by_shard[shard].empty()) tell(window, shard, by_shard[shard]);
+    }
   }
 }
 
-void EffectRunner::tell_again(const Session& session, AttachCommand& command) const {
-  for (const ServiceMovedDue& untold : parts_.membership.services().untold_moves(session.index)) {
-    const auto frame =
-        control_frame(proto::Kind::ns, command.node, parts_.facts.id, payload_of(untold));
+void EffectRunner::tell_again(Session& session, AttachCommand& command) const {
+  const Services& services = parts_.membership.services();
+  for (const Topic* topic : services.moved_since(session.index, session.change_seen)) {
+    const auto frame = control_frame(proto::Kind::ns, command.node, parts_.facts.id,
+                                     payload_of(*topic, topic->window_of(session.index)));
     command.told.insert(command.told.end(), frame.begin(), frame.end());
-    command.told_move = std::max(command.told_move, untold.move);
   }
+  session.change_seen = services.changes();
 }
 
-proto::Payload EffectRunner::payload_of(const ServiceMovedDue& effect) const {
+proto::Payload EffectRunner::payload_of(const Topic& topic, std::uint32_t window) const {
   ns::ServiceMoved event;
-  event.name = effect.full_name;
-  event.old_group = group_id(effect.old_group);
-  event.new_group = group_id(effect.new_group);
-  event.message_type = effect.message_type;
-  event.instance = effect.instance;
-  event.delivery = effect.delivery;
-  event.window = effect.window;
-  event.retain = effect.retain;
-  event.direction = effect.direction;
-  event.again = effect.again;
-  for (const GroupIndex group : effect.between) event.between.push_back(group_id(group));
+  event.name = std::string{topic.full_name};
+  const HubTitle title{parts_.facts.id, parts_.facts.name};
+  put_state(event, title, topic, parts_.membership);
+  event.window = window;
   return proto::encode(event);
 }
 
@@ -141,35 +133,31 @@ void EffectRunner::run(const PaceDue& effect) {
   const PaceTerms terms{effect.terms.window, effect.terms.depth, effect.terms.interval_us};
   parts_.shards.send(session->place.shard,
                      PaceCommand{ref_of(session->place), group_id(effect.group), terms,
-                                 effect.retained, effect.was_plain});
+                                 effect.retained, effect.was_plain, effect.terms.number});
 }
 
 void EffectRunner::run(const PaceEnded& effect) {
   const Session* session = find(effect.subscriber);
   if (session == nullptr) return;  // its subscriptions end with it
-  const EndPaceCommand command{ref_of(session->place), group_id(effect.group), effect.group_gone};
-  if (effect.group_gone && endings_.contains(effect.group)) {
-    return endings_.defer(effect.group, session->place.shard, command);
-  }
-  parts_.shards.send(session->place.shard, command);
+  parts_.shards.send(session->place.shard,
+                     EndPaceCommand{ref_of(session->place), group_id(effect.group)});
 }
 
 void EffectRunner::run(const RetainedDropped& effect) {
   const Session* session = find(effect.provider);
   if (session == nullptr) return;  // what its shard keeps of it ends with it
-  parts_.shards.send(session->place.shard, ForgetRetainedCommand{group_id(effect.group)});
+  parts_.shards.send(
+      session->place.shard,
+      ForgetRetainedCommand{group_id(effect.group), make_id(parts_.facts.id, effect.provider)});
 }
 
-void EffectRunner::run(const SubscriberDue& effect) {
-  const Session* session = find(effect.provider);
+void EffectRunner::run(const SubscribersChanged& effect) {
+  const Topic* topic = parts_.membership.services().find(effect.full_name);
+  if (topic == nullptr || !topic->provided()) return;
+  const Session* session = find(topic->service->provider);
   if (session == nullptr) return;
-  const auto fill = [&](auto event) {
-    event.group = group_id(effect.group);
-    event.node = make_id(parts_.facts.id, effect.subscriber);
-    event.subscribers = effect.subscribers_now;
-    return proto::encode(event);
-  };
-  send_event(*session, effect.joined ? fill(ns::SubscriberJoined{}) : fill(ns::SubscriberLeft{}));
+  const auto number = static_cast<std::uint32_t>(topic->subscribers.size());
+  send_event(*session, proto::encode(ns::Subscribers{group_id(topic->service->group), number}));
 }
 
 void EffectRunner::run(const NameDecided& effect) {

@@ -2,7 +2,6 @@
 
 #include <chrono>
 
-#include "hub/control/group_endings.hpp"
 #include "hub/control/hub_facts.hpp"
 #include "hub/control/shard_proxy.hpp"
 #include "hub/control/state/effects.hpp"
@@ -28,28 +27,27 @@ class EffectRunner {
     TablePublisher& publisher;
     StateKeeper& keeper;
   };
-  explicit EffectRunner(const Parts& parts) : parts_(parts), endings_(parts.shards) {}
+  explicit EffectRunner(const Parts& parts) : parts_(parts) {}
 
   void carry_out(const Effects& effects, std::chrono::milliseconds now);
-  /// A shard has taken what another one had handed over to it.
-  void fence_passed(const FencePassedEvent& event);
   /// Sends an event of kind NS; nothing to a node that is away.
   void send_event(const Session& session, const proto::Payload& payload);
-  /// Adds what the node has to be told ahead of all else, since it came back: how services moved
-  /// meanwhile.
-  void tell_again(const Session& session, AttachCommand& command) const;
+  /// Adds what the node has to be told ahead of all else, since it came back: the services that
+  /// changed since its previous connection began.
+  void tell_again(Session& session, AttachCommand& command) const;
 
  private:
   void run(const NodeChanged& effect);
   void run(const GroupChanged& effect);
+  void run(const ProviderChanged& effect);
   void run(const MemberChanged& effect);
   void run(const SessionEnded& effect);
   void run(const RenumberDue& effect);
-  void run(const ServiceMovedDue& effect);
+  void run(const ServiceMoved& effect);
   void run(const PaceDue& effect);
   void run(const PaceEnded& effect);
   void run(const RetainedDropped& effect);
-  void run(const SubscriberDue& effect);
+  void run(const SubscribersChanged& effect);
   void run(const CloseDue& effect);
   void run(const StateDue& effect);
   void run(const NameDecided& effect);
@@ -57,10 +55,9 @@ class EffectRunner {
     return parts_.membership.sessions().find(node);
   }
   [[nodiscard]] GroupId group_id(GroupIndex group) const;
-  [[nodiscard]] proto::Payload payload_of(const ServiceMovedDue& effect) const;
+  [[nodiscard]] proto::Payload payload_of(const Topic& topic, std::uint32_t window) const;
 
   const Parts parts_;
-  GroupEndings endings_;
 };
 
 }  // namespace gimnet::hub

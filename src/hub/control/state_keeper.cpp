@@ -22,9 +22,6 @@ std::string StateKeeper::keep_at_once(Membership& membership, milliseconds now) 
   state.node_mark = durable.nodes.mark;
   state.group_mark = durable.groups.mark;
   state.nodes_used = durable.nodes.used;
-  state.groups_used = durable.groups.used;
-  state.group_forgettings = durable.groups.forgettings;
-  state.groups_outlasting = durable.groups.outlasting;
   state.kicked = durable.kicked;
   if (std::string error = keep_(state); !error.empty()) {
     log_error(error +

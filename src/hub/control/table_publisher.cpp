@@ -35,10 +35,7 @@ void TablePublisher::publish_group(GroupIndex index, const Membership& membershi
   std::unique_ptr<GroupMembers> members;
   if (const Topic* topic = membership.services().find_group(index); topic != nullptr) {
     members = std::make_unique<GroupMembers>();
-    const Session* provider = membership.sessions().find(topic->service->provider);
-    GIMNET_CHECK(provider != nullptr);
-    members->provider = make_id(hub_, topic->service->provider);
-    members->provider_place = node_place(*provider);
+    put_provider(*members, topic->service->provider, membership);
     members->by_shard.resize(shards_);
     members->retain = topic->service->terms.retain;
     members->accepts = topic->service->terms.direction == proto::ns::Direction::accepts;
@@ -51,13 +48,28 @@ void TablePublisher::publish_group(GroupIndex index, const Membership& membershi
   replace(index, std::move(members));
 }
 
+void TablePublisher::publish_provider(GroupIndex index, const Membership& membership) {
+  const auto found = published_.find(index);
+  const Topic* topic = membership.services().find_group(index);
+  if (found == published_.end() || topic == nullptr) return publish_group(index, membership);
+  auto members = std::make_unique<GroupMembers>(*found->second);
+  put_provider(*members, topic->service->provider, membership);
+  replace(index, std::move(members));
+}
+
+void TablePublisher::put_provider(GroupMembers& members, NodeIndex provider,
+                                  const Membership& membership) const {
+  const Session* session = membership.sessions().find(provider);
+  members.provider = session == nullptr ? NodeId{} : make_id(hub_, provider);
+  members.provider_place = session == nullptr ? NodePlace{} : node_place(*session);
+}
+
 bool TablePublisher::publish_member(GroupIndex index, NodeIndex subscriber,
                                     const Membership& membership) {
   const auto found = published_.find(index);
   const Topic* topic = membership.services().find_group(index);
   const NodePlace place = place_of(subscriber, membership);
-  if (found == published_.end() || found->second->ends() || topic == nullptr || !place.exists())
-    return false;
+  if (found == published_.end() || topic == nullptr || !place.exists()) return false;
   auto members = std::make_unique<GroupMembers>(*found->second);
   members->by_shard[place.shard.value()].erase(place.slot);
   auto& paced = members->paced_by_shard;
@@ -86,29 +98,6 @@ void TablePublisher::put(GroupMembers& members, const Topic& topic, NodeIndex su
   const bool was_plain = topic.once_plain.contains(subscriber);
   members.paced_by_shard[place.shard.value()].put({place.slot, place.generation, was_plain});
 }
-
-std::optional<ShardIndex> TablePublisher::end_group(GroupIndex index) {
-  const auto found = published_.find(index);
-  if (found == published_.end()) return std::nullopt;
-  const GroupMembers& before = *found->second;
-  const ShardIndex provider_shard = before.provider_place.shard;
-  const auto is_elsewhere = [provider_shard](const auto& by_shard) {
-    for (std::size_t shard = 0; shard < by_shard.size(); ++shard) {
-      if (shard != provider_shard.value() && !by_shard[shard].empty()) return true;
-    }
-    return false;
-  };
-  if (!is_elsewhere(before.by_shard) && !is_elsewhere(before.paced_by_shard)) {
-    replace(index, nullptr);
-    return std::nullopt;
-  }
-  auto ending = std::make_unique<GroupMembers>(before);
-  ending->provider = NodeId{};
-  replace(index, std::move(ending));
-  return provider_shard;
-}
-
-void TablePublisher::clear_group(GroupIndex index) { replace(index, nullptr); }
 
 void TablePublisher::replace(GroupIndex index, std::unique_ptr<const GroupMembers> members) {
   static_cast<void>(tables_.groups.exchange(index.value(), members.get()));

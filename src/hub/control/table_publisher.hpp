@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <deque>
 #include <memory>
-#include <optional>
 #include <unordered_map>
 
 #include "hub/concurrent/quiescence.hpp"
@@ -33,18 +32,14 @@ class TablePublisher {
   void publish_node(NodeIndex index, const Membership& membership);
   /// Publishes what `membership` says of the group now: as much work as the group has members.
   void publish_group(GroupIndex index, const Membership& membership);
+  /// Publishes who provides the group now, and nothing else: the lists of members are shared.
+  void publish_provider(GroupIndex index, const Membership& membership);
   /// Publishes what `membership` says of that subscriber of the group, and of nothing else: little
   /// work, whatever the group's size. False: nothing was done, since the group, or where the node
   /// lives, is not published; publish_group() is due. REQUIRES: the node lives where the table of
   /// nodes says, if its session is over.
   [[nodiscard]] bool publish_member(GroupIndex index, NodeIndex subscriber,
                                     const Membership& membership);
-
-  /// The group has no provider any more. Where it has members on other shards than its provider's,
-  /// the table says so and keeps them for what is on its way there, until clear_group(): returns
-  /// the provider's shard. Otherwise it is cleared.
-  [[nodiscard]] std::optional<ShardIndex> end_group(GroupIndex index);
-  void clear_group(GroupIndex index);
 
   /// Frees what nobody looks at any more.
   void collect();
@@ -57,6 +52,7 @@ class TablePublisher {
   };
   /// Where the node lives, or lived until now.
   [[nodiscard]] NodePlace place_of(NodeIndex node, const Membership& membership) const;
+  void put_provider(GroupMembers& members, NodeIndex provider, const Membership& membership) const;
   void put(GroupMembers& members, const Topic& topic, NodeIndex subscriber,
            const NodePlace& place) const;
   void replace(GroupIndex index, std::unique_ptr<const GroupMembers> members);

@@ -57,9 +57,7 @@ void Attacher::attach(AttachCommand command) {
 }
 
 void Attacher::tell_again(Connection& connection, const AttachCommand& command) {
-  if (command.told.empty()) return;
-  connection.outbox.push_first_control(command.told, state_.egress);
-  ask_whether_read(state_, connection, command.told_move);
+  if (!command.told.empty()) connection.outbox.push_first_control(command.told, state_.egress);
 }
 
 void Attacher::renumber(Connection& connection, NodeId node) {
@@ -155,7 +153,7 @@ void Attacher::count_anew(Connection& connection) {
   connection.paced->for_each([&](PacedSubscription& each) {
     const bool has_newer =
         each.held() != 0 || connection.outbox.waiting_messages(each.group()) != 0;
-    if (each.active && each.retained && !has_newer) state_.retained.ask_start(each);
+    if (each.retained && !has_newer) state_.retained.ask_start(each);
   });
 }
 

@@ -94,7 +94,6 @@ void Closer::detach(Connection& connection, bool said_goodbye) {
   connection.armed = Interest{};
   connection.requests = 0;
   connection.progress.reset();
-  state_.readings.erase(connection.slot.value());
   state_.receive_buffer.forget(connection.tail);
   if (connection.gate.has(ReadGate::no_room)) {
     connection.gate.clear(ReadGate::no_room);

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -19,16 +20,16 @@
 //
 // Order: the conductor publishes a node before it sends AttachCommand, which lets WELCOME out, and
 // sends AttachCommand before it names the node to anybody else; it sends a SERVICE_MOVED before the
-// answer that lets the provider send, and once more with the AttachCommand of a node that may not
-// have read it; it publishes a group before it sends the PaceCommand of a member, and that before
+// answer that lets the provider send, and once more with the AttachCommand of a node that comes
+// back; it publishes a group before it sends the PaceCommand of a member, and that before
 // any answer; it sends a RenumberCommand before it names the new id to anybody else, and publishes
 // a group that accepts data before SERVICE_MOVED tells senders of it. So commands that wait are
 // carried out before mail that came after them: a frame neither finds its recipient unattached, or
 // on a connection on which it has another id, nor overtakes the event about it.
 //
 // The other way round a shard's mail to other shards and its events to the conductor may overtake
-// each other. Where the conductor takes something away that such mail needs, a group, it fences
-// first (hub/control/group_endings.hpp).
+// each other. So a group keeps its members when its provider goes: frames that are on their way are
+// delivered, unless another node provides it by then (hub/data/route/router.hpp).
 
 namespace gimnet::hub {
 
@@ -64,22 +65,26 @@ struct AttachCommand {
   std::uint32_t peer_resume_bytes = 0;
   std::uint32_t peer_frame_bytes = 0;
   /// Control frames that the node gets ahead of all that waits for it, whatever their size: events
-  /// that it may have missed. `told_move`: as SendControlCommand::move.
+  /// that it may have missed.
   std::vector<std::byte> told;
-  std::uint64_t told_move = 0;
+};
+
+/// The subscriber's counts of that group begin at 0, with what is written from now on.
+struct CountsBegin {
+  GroupId group;
+  std::uint8_t number = 0;  ///< that the subscriber gave them
 };
 
 /// A control frame (header and payload) for a session; goes before the data lanes. `answers` is how
 /// many of the session's unanswered requests it settles: 1 for an answer, 0 for an event. An answer
 /// is for the connection that asked: it is dropped if `attachment` is not the present one. 0 is
-/// whichever there is; without one it is dropped. `move`, if not 0: the shard says so, with
-/// MovesReadEvent, when the node has read the frame.
+/// whichever there is; without one it is dropped.
 struct SendControlCommand {
   SessionRef session;
   std::uint32_t attachment = 0;
   std::vector<std::byte> frame;
   std::uint32_t answers = 0;
-  std::uint64_t move = 0;
+  std::optional<CountsBegin> counts{};  ///< that begin with the frame
 };
 
 /// One event for many sessions of a shard, encoded once: each gets it as by a SendControlCommand.
@@ -92,7 +97,6 @@ struct TellCommand {
   };
   std::vector<To> to;            ///< at most kToMost
   std::vector<std::byte> frame;  ///< to node 0: set_destination() for each of them
-  std::uint64_t move = 0;        ///< as SendControlCommand::move
 };
 
 /// Say GOODBYE and close the session's connection. The session itself stays until ReleaseCommand.
@@ -109,25 +113,28 @@ struct ReleaseCommand {
 };
 
 /// The session's subscription to that group is paced from now on, or has other terms. `retained`:
-/// it begins with the last message. `was_plain`: until then it got everything.
+/// it begins with the last message. `was_plain`: until then it got everything. `number`: of its
+/// counts, if it begins.
 struct PaceCommand {
   SessionRef session;
   GroupId group;
   PaceTerms terms;
   bool retained = false;
   bool was_plain = false;
+  std::uint8_t number = 0;
 };
 
-/// A paced subscription ended. `group_gone`: so did the group, and its id may be another's later.
+/// A paced subscription ended, or its group is gone.
 struct EndPaceCommand {
   SessionRef session;
   GroupId group;
-  bool group_gone = false;
 };
 
-/// To the provider's shard: the group is gone, its last message is not kept any more.
+/// To the shard of a node that provides the group no more: its last message is not kept any more,
+/// but what the next provider sent there is.
 struct ForgetRetainedCommand {
   GroupId group;
+  NodeId provider;
 };
 
 /// The session's node has another id. Its connection, if it has one, is told so with GOODBYE
@@ -136,12 +143,6 @@ struct RenumberCommand {
   SessionRef session;
   NodeId node;
   std::string sentence;
-};
-
-/// Asks each other shard to tell the conductor, with FencePassedEvent, when it has taken all that
-/// this one handed over.
-struct FenceCommand {
-  std::uint32_t ticket = 0;  ///< numbers the fences of this shard
 };
 
 /// What the shard goes by from its next turn on.
@@ -158,10 +159,9 @@ struct DrainCommand {
 /// End the shard's thread.
 struct StopCommand {};
 
-using ShardCommand =
-    std::variant<AttachCommand, SendControlCommand, TellCommand, CloseCommand, ReleaseCommand,
-                 RenumberCommand, LimitsCommand, PaceCommand, EndPaceCommand, ForgetRetainedCommand,
-                 FenceCommand, DrainCommand, StopCommand>;
+using ShardCommand = std::variant<AttachCommand, SendControlCommand, TellCommand, CloseCommand,
+                                  ReleaseCommand, RenumberCommand, LimitsCommand, PaceCommand,
+                                  EndPaceCommand, ForgetRetainedCommand, DrainCommand, StopCommand>;
 
 // ---- shard -> conductor
 // --------------------------------------------------------------------------------------------
@@ -172,15 +172,6 @@ struct ControlFrameEvent {
   std::uint32_t attachment = 0;  ///< of the connection that it came by
   NodeId node;
   std::vector<std::byte> frame;
-};
-
-/// The node has read the frame that came with that `move`, and all that was sent before it by this
-/// connection.
-struct MovesReadEvent {
-  SessionRef session;
-  std::uint32_t attachment = 0;
-  NodeId node;
-  std::uint64_t move = 0;
 };
 
 /// A session has no connection any more. `code` is `done` only if the node said so itself: then the
@@ -207,17 +198,9 @@ struct FarewellEvent {
 /// The shard has nothing left to write, nor any other for it (answer to DrainCommand).
 struct DrainedEvent {};
 
-/// The shard that tells it has taken all that shard `fence.of` handed over to it before it carried
-/// out FenceCommand.
-struct FencePassedEvent {
-  Fence fence;
-};
-
 struct ShardEvent {
   ShardIndex shard;
-  std::variant<ControlFrameEvent, MovesReadEvent, DetachedEvent, FarewellEvent, DrainedEvent,
-               FencePassedEvent>
-      what;
+  std::variant<ControlFrameEvent, DetachedEvent, FarewellEvent, DrainedEvent> what;
 };
 
 }  // namespace gimnet::hub

@@ -24,20 +24,4 @@ void send_confirm(ShardState& state, Connection& connection) {
   state.recipients.mark_dirty(connection);
 }
 
-/// One PING is under way at a time, so that a service that moves all the time costs one a round
-/// trip.
-void ask_whether_read(ShardState& state, Connection& connection, std::uint64_t move) {
-  Reading& reading = state.readings[connection.slot.value()];
-  reading.wanted = move;
-  if (reading.sequence != 0) return;
-  if (++connection.ping_sequence == 0) ++connection.ping_sequence;
-  // Without room it is asked behind the next one, or not at all: then the node is told again at its
-  // next return.
-  if (!push_flow(state, connection, proto::flow::Ping{connection.ping_sequence, wall_now_ns()}))
-    return;
-  reading.sequence = connection.ping_sequence;
-  reading.asked = move;
-  state.recipients.mark_dirty(connection);
-}
-
 }  // namespace gimnet::hub

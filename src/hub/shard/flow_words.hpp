@@ -12,9 +12,6 @@ namespace gimnet::hub {
 
 /// Tells the peer how many data frames were taken from it.
 void send_confirm(ShardState& state, Connection& connection);
-/// The conductor wants to know when the node has read all that it was sent so far; `move` is its
-/// name for that.
-void ask_whether_read(ShardState& state, Connection& connection, std::uint64_t move);
 /// Queues a FLOW frame to the peer of this connection, to be flushed by the caller; false: no room.
 [[nodiscard]] bool push_flow(ShardState& state, Connection& connection,
                              const proto::flow::Message& message);

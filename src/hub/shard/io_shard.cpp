@@ -240,7 +240,10 @@ void IoShard::execute(ShardCommand& command) {
                    if (control.attachment != 0 && control.attachment != connection->attachment)
                      return;
                    connection->requests -= std::min(control.answers, connection->requests);
-                   say(*connection, control.frame, control.move);
+                   if (control.counts)
+                     state_.pacer.begin_counts(*connection, control.counts->group,
+                                               control.counts->number);
+                   say(*connection, control.frame);
                  },
                  [&](TellCommand& told) { tell(told); },
                  [&](CloseCommand& close) {
@@ -260,23 +263,21 @@ void IoShard::execute(ShardCommand& command) {
                  [&](PaceCommand& pace) { begin_pace(pace); },
                  [&](EndPaceCommand& end) {
                    if (Connection* connection = state_.find(end.session)) {
-                     state_.pacer.unsubscribe(*connection, end.group, end.group_gone);
+                     state_.pacer.unsubscribe(*connection, end.group);
                    }
                  },
-                 [&](ForgetRetainedCommand& forget) { state_.retained.forget(forget.group); },
-                 [&](const FenceCommand& fence) { state_.fanout.post_fence(fence.ticket); },
+                 [&](ForgetRetainedCommand& forget) {
+                   state_.retained.forget(forget.group, forget.provider);
+                 },
                  [&](DrainCommand& drain) { keeper_.drain(drain.deadline_ms); },
                  [&](StopCommand&) { stopped_ = true; },
              },
              command);
 }
 
-void IoShard::say(Connection& connection, std::span<const std::byte> frame, std::uint64_t move) {
-  if (connection.outbox.push_control(frame, state_.egress)) {
-    state_.recipients.mark_dirty(connection);
-    if (move != 0) ask_whether_read(state_, connection, move);
-    return;
-  }
+void IoShard::say(Connection& connection, std::span<const std::byte> frame) {
+  if (connection.outbox.push_control(frame, state_.egress))
+    return state_.recipients.mark_dirty(connection);
   closer_.close(connection, proto::GoodbyeCode::too_many_requests,
                 "answers wait and are not taken; read what you asked for");
 }
@@ -286,7 +287,7 @@ void IoShard::tell(TellCommand& command) {
     Connection* connection = state_.find(to.session);
     if (connection == nullptr || !connection->connected) continue;
     set_destination(command.frame, to.node);
-    say(*connection, command.frame, command.move);
+    say(*connection, command.frame);
   }
 }
 
@@ -294,8 +295,8 @@ void IoShard::begin_pace(const PaceCommand& command) {
   Connection* connection = state_.find(command.session);
   if (connection == nullptr) return;
   const bool begins = Pacer::find(*connection, command.group) == nullptr;
-  PacedSubscription& subscription =
-      state_.pacer.subscribe(*connection, command.group, command.terms, command.was_plain);
+  PacedSubscription& subscription = state_.pacer.subscribe(
+      *connection, command.group, command.terms, command.was_plain, command.number);
   subscription.retained = command.retained;
   if (begins && command.retained) state_.retained.ask_start(subscription);
 }

@@ -69,7 +69,7 @@ class IoShard {
   void finish_turn();
   void execute(ShardCommand& command);
   /// Hands a control frame to the connection, or closes it if too many wait.
-  void say(Connection& connection, std::span<const std::byte> frame, std::uint64_t move);
+  void say(Connection& connection, std::span<const std::byte> frame);
   void tell(TellCommand& command);
   void begin_pace(const PaceCommand& command);
 

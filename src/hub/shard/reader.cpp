@@ -245,14 +245,12 @@ bool Reader::handle_flow(Connection& connection, const proto::RunView& view) {
                   "malformed FLOW frame: unknown operation, or too short for it");
   }
   if (const auto* ping = std::get_if<proto::flow::Ping>(&*message)) on_ping(connection, *ping);
-  if (const auto* pong = std::get_if<proto::flow::Pong>(&*message)) on_pong(connection, *pong);
   if (const auto* confirm = std::get_if<proto::flow::Confirm>(&*message))
     on_confirm(connection, *confirm);
   if (const auto* skip = std::get_if<proto::flow::Skip>(&*message))
     return on_skip(connection, *skip);
   if (const auto* credit = std::get_if<proto::flow::Credit>(&*message)) {
-    if (!state_.pacer.on_credit(connection, credit->group, credit->taken))
-      return take_bad_credit(connection);
+    if (!state_.pacer.on_credit(connection, *credit)) return take_bad_credit(connection);
   }
   return true;
 }
@@ -272,18 +270,6 @@ bool Reader::take_bad_credit(Connection& connection) {
 void Reader::on_ping(Connection& connection, const proto::flow::Ping& ping) {
   send_flow(state_, connection, proto::flow::Pong{ping.sequence, ping.sent_ns, wall_now_ns()});
   if (connection.resume) send_confirm(state_, connection);
-}
-
-void Reader::on_pong(Connection& connection, const proto::flow::Pong& pong) {
-  const auto found = state_.readings.find(connection.slot.value());
-  if (found == state_.readings.end()) return;
-  Reading& reading = found->second;
-  if (reading.sequence == 0 || pong.sequence != reading.sequence) return;
-  state_.tell_conductor({state_.self, MovesReadEvent{connection.session(), connection.attachment,
-                                                     connection.node, reading.asked}});
-  reading.sequence = 0;
-  if (reading.wanted != reading.asked) return ask_whether_read(state_, connection, reading.wanted);
-  state_.readings.erase(found);
 }
 
 void Reader::on_confirm(Connection& connection, const proto::flow::Confirm& confirm) {
@@ -375,10 +361,8 @@ void Reader::take_word(const Mail& mail) {
       return state_.retained.on_start_wanted(word_of<GroupStart>(mail));
     case MailKind::start:
       return state_.retained.on_start(word_of<GroupStart>(mail));
-    case MailKind::fence:
-      return state_.tell_conductor({state_.self, FencePassedEvent{word_of<Fence>(mail)}});
     case MailKind::last:
-      state_.done_shards |= std::uint64_t{1} << word_of<Fence>(mail).of.value();
+      state_.done_shards |= std::uint64_t{1} << word_of<ShardIndex>(mail).value();
       return;
     case MailKind::retained:
       return state_.retained.on_handed(

@@ -56,7 +56,6 @@ class Reader {
   [[nodiscard]] bool handle_link(Connection& connection, const proto::RunView& view);
   [[nodiscard]] bool handle_control(Connection& connection, const proto::RunView& view);
   void on_ping(Connection& connection, const proto::flow::Ping& ping);
-  void on_pong(Connection& connection, const proto::flow::Pong& pong);
   /// False: it was one too many, and the connection was closed.
   [[nodiscard]] bool take_bad_credit(Connection& connection);
   void on_confirm(Connection& connection, const proto::flow::Confirm& confirm);

@@ -25,14 +25,6 @@
 
 namespace gimnet::hub {
 
-/// What the conductor wants to know to be read by the node: asked with a PING behind it, and known
-/// by its PONG, as both ends read in order.
-struct Reading {
-  std::uint32_t sequence = 0;  ///< of the PING under way; 0: none
-  std::uint64_t asked = 0;     ///< the move behind which it stands
-  std::uint64_t wanted = 0;    ///< the latest
-};
-
 /// What all shards of a hub share. Thread safety: immutable, but for what says otherwise. Lifetime:
 /// longer than any shard.
 struct HubShared {
@@ -77,8 +69,6 @@ struct ShardState {
   Poller poller;
   std::vector<std::unique_ptr<Connection>> connections;  ///< by slot
   std::vector<Connection*> waiting_for_room;
-  std::unordered_map<std::uint32_t, Reading>
-      readings;  ///< by slot, while the conductor waits for them
   std::vector<std::uint64_t>
       with_rest;  ///< tokens of connections whose last read was not routed whole, by age
   std::uint64_t now_ms = 0;

@@ -11,7 +11,6 @@ namespace {
 /// Heads, keys, lengths and numbers of any record.
 constexpr std::size_t kRecordOverhead = 160;
 /// Of SERVICE_MOVED: a group in between, repeated.
-constexpr std::uint32_t kBetweenKey = 12;
 
 std::string read_name(Fields& fields, std::uint32_t key, const char* name) {
   return fields.required_text(key, name, kNameBytesMax);
@@ -179,10 +178,8 @@ void Advertise::write(bitestream::Writer& writer) const {
   put_choice(writer, 6, direction);
   put_choice(writer, 7, delivery);
   put_clean_text(writer, 8, metadata, kMetadataBytesMax);
-  if (former_group.value() != 0) writer.put_u32(9, former_group.value());
   if (window != 0) writer.put_u32(10, window);
   if (retain) writer.put_bool(11, retain);
-  if (!former_proof.empty()) writer.put_opaque(12, former_proof);
 }
 Advertise Advertise::read(Fields& fields) {
   Advertise advertise;
@@ -192,23 +189,19 @@ Advertise Advertise::read(Fields& fields) {
   advertise.direction = read_known_choice(fields, 6, "direction", Direction::accepts);
   advertise.delivery = read_known_choice(fields, 7, "delivery", Delivery::sync);
   advertise.metadata = fields.text(8, "metadata", kMetadataBytesMax);
-  advertise.former_group = read_id<GroupId>(fields, 9, "former group id");
   advertise.window = fields.number<std::uint32_t>(10, "window", 0);
   advertise.retain = fields.flag(11, "retain", false);
-  advertise.former_proof = fields.opaque(12, "proof of the former group", kGroupProofBytesMax);
   return advertise;
 }
 
 void AdvertiseAnswer::write(bitestream::Writer& writer) const {
   writer.put_u32(3, group.value());
   writer.put_u32(4, subscribers);
-  if (!proof.empty()) writer.put_opaque(5, proof);
 }
 AdvertiseAnswer AdvertiseAnswer::read(Fields& fields) {
   AdvertiseAnswer answer;
   answer.group = read_required_id<GroupId>(fields, 3, "group id");
   answer.subscribers = fields.number<std::uint32_t>(4, "number of subscribers", 0);
-  answer.proof = fields.opaque(5, "proof of the group", kGroupProofBytesMax);
   return answer;
 }
 
@@ -285,6 +278,7 @@ void Subscribe::write(bitestream::Writer& writer) const {
   if (window != 0) writer.put_u32(4, window);
   if (depth != 1) writer.put_u32(5, depth);
   if (rate_hz != 0.0) writer.put_f64(6, rate_hz);
+  if (number != 0) writer.put_u8(7, number);
 }
 Subscribe Subscribe::read(Fields& fields) {
   Subscribe subscribe;
@@ -292,27 +286,41 @@ Subscribe Subscribe::read(Fields& fields) {
   subscribe.window = fields.number<std::uint32_t>(4, "window", 0);
   subscribe.depth = fields.number<std::uint32_t>(5, "depth", 1);
   subscribe.rate_hz = fields.number<double>(6, "maximal rate", 0.0);
+  subscribe.number = fields.number<std::uint8_t>(7, "count number", 0);
   return subscribe;
 }
 
+void ServiceState::write_state(bitestream::Writer& writer) const {
+  writer.put_u32(4, group.value());
+  if (provider.value() != 0) writer.put_u32(5, provider.value());
+  if (session != 0) writer.put_u64(6, session);
+  writer.put_u32(7, message_type);
+  writer.put_u32(8, instance);
+  put_choice(writer, 9, delivery);
+  if (window != 0) writer.put_u32(10, window);
+  if (retain) writer.put_bool(11, retain);
+  if (direction != Direction::provides) put_choice(writer, 12, direction);
+}
+void ServiceState::read_state(Fields& fields) {
+  group = read_id<GroupId>(fields, 4, "group id");
+  provider = read_id<NodeId>(fields, 5, "provider's node id");
+  session = fields.number<std::uint64_t>(6, "provider's session", 0);
+  message_type = fields.number<std::uint32_t>(7, "message type", 0);
+  instance = fields.number<std::uint32_t>(8, "instance", 0);
+  delivery = read_choice<Delivery>(fields, 9, "delivery");
+  window = fields.number<std::uint32_t>(10, "window", 0);
+  retain = fields.flag(11, "retain", false);
+  direction = read_choice<Direction>(fields, 12, "direction");
+}
+
 void SubscribeAnswer::write(bitestream::Writer& writer) const {
-  writer.put_u32(3, group.value());
-  writer.put_u32(4, message_type);
-  writer.put_u32(5, instance);
-  put_choice(writer, 7, delivery);
-  if (window != 0) writer.put_u32(8, window);
-  if (retain) writer.put_bool(9, retain);
-  if (direction != Direction::provides) put_choice(writer, 10, direction);
+  if (number != 0) writer.put_u8(3, number);
+  write_state(writer);
 }
 SubscribeAnswer SubscribeAnswer::read(Fields& fields) {
   SubscribeAnswer answer;
-  answer.group = read_id<GroupId>(fields, 3, "group id");
-  answer.message_type = fields.number<std::uint32_t>(4, "message type", 0);
-  answer.instance = fields.number<std::uint32_t>(5, "instance", 0);
-  answer.delivery = read_choice<Delivery>(fields, 7, "delivery");
-  answer.window = fields.number<std::uint32_t>(8, "window", 0);
-  answer.retain = fields.flag(9, "retain", false);
-  answer.direction = read_choice<Direction>(fields, 10, "direction");
+  answer.number = fields.number<std::uint8_t>(3, "count number", 0);
+  answer.read_state(fields);
   return answer;
 }
 
@@ -323,76 +331,26 @@ Unsubscribe Unsubscribe::read(Fields& fields) {
   return {read_name(fields, 3, "full service name")};
 }
 
-namespace {
-
-std::vector<GroupId> read_between(Fields& fields) {
-  std::vector<GroupId> between;
-  bitestream::Reader reader = fields.reader();
-  while (const auto next = reader.next()) {
-    if (!(next->key() == bitestream::Key(kBetweenKey))) continue;
-    const auto group = next->as<std::uint32_t>();
-    if (!group) fields.fail("has a group in between that is not a number that fits");
-    if (between.size() == kGroupsBetweenMax) {
-      fields.fail("has more than " + std::to_string(kGroupsBetweenMax) + " groups in between");
-    }
-    if (fields.failed()) return {};
-    between.emplace_back(*group);
-  }
-  return between;
-}
-
-}  // namespace
-
 void ServiceMoved::write(bitestream::Writer& writer) const {
   put_clean_text(writer, 3, name, kWrittenNameBytesMax);
-  writer.put_u32(4, old_group.value());
-  writer.put_u32(5, new_group.value());
-  writer.put_u32(6, message_type);
-  writer.put_u32(7, instance);
-  put_choice(writer, 8, delivery);
-  if (window != 0) writer.put_u32(9, window);
-  if (retain) writer.put_bool(10, retain);
-  if (again) writer.put_bool(11, again);
-  for (const GroupId group : between) writer.put_u32(kBetweenKey, group.value());
-  if (direction != Direction::provides) put_choice(writer, 13, direction);
+  write_state(writer);
 }
 ServiceMoved ServiceMoved::read(Fields& fields) {
   ServiceMoved moved;
   moved.name = read_name(fields, 3, "full service name");
-  moved.old_group = read_id<GroupId>(fields, 4, "old group id");
-  moved.new_group = read_id<GroupId>(fields, 5, "new group id");
-  moved.message_type = fields.number<std::uint32_t>(6, "message type", 0);
-  moved.instance = fields.number<std::uint32_t>(7, "instance", 0);
-  moved.delivery = read_choice<Delivery>(fields, 8, "delivery");
-  moved.window = fields.number<std::uint32_t>(9, "window", 0);
-  moved.retain = fields.flag(10, "retain", false);
-  moved.again = fields.flag(11, "told again", false);
-  moved.between = read_between(fields);
-  moved.direction = read_choice<Direction>(fields, 13, "direction");
+  moved.read_state(fields);
   return moved;
 }
 
-void SubscriberChange::write(bitestream::Writer& writer) const {
+void Subscribers::write(bitestream::Writer& writer) const {
   writer.put_u32(3, group.value());
-  writer.put_u32(4, node.value());
-  writer.put_u32(5, subscribers);
+  writer.put_u32(4, subscribers);
 }
-void SubscriberChange::read_into(Fields& fields) {
-  group = read_required_id<GroupId>(fields, 3, "group id");
-  node = read_required_id<NodeId>(fields, 4, "node id");
-  subscribers = fields.number<std::uint32_t>(5, "number of subscribers", 0);
-}
-
-SubscriberJoined SubscriberJoined::read(Fields& fields) {
-  SubscriberJoined joined;
-  joined.read_into(fields);
-  return joined;
-}
-
-SubscriberLeft SubscriberLeft::read(Fields& fields) {
-  SubscriberLeft left;
-  left.read_into(fields);
-  return left;
+Subscribers Subscribers::read(Fields& fields) {
+  Subscribers read;
+  read.group = read_required_id<GroupId>(fields, 3, "group id");
+  read.subscribers = fields.number<std::uint32_t>(4, "number of subscribers", 0);
+  return read;
 }
 
 }  // namespace gimnet::proto::ns

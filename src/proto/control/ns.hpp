@@ -30,8 +30,7 @@ enum class Operation : std::uint16_t {
   unwatch = 12,
   watch_taken = 13,
   service_moved = 32,
-  subscriber_joined = 33,
-  subscriber_left = 34,
+  subscribers = 33,
   name_confirmed = 35,
   name_lost = 36,
   watch_events = 37,
@@ -55,9 +54,6 @@ enum class Delivery : std::uint8_t { stream = 0, latest = 1, sync = 2 };
 
 /// Records of one page, if the request does not say.
 inline constexpr std::uint32_t kPageRecordsDefault = 256;
-/// The longest proof of a group that a node keeps for a hub, and shows to it; a hub of today writes
-/// 16 bytes.
-inline constexpr std::size_t kGroupProofBytesMax = 64;
 
 // RESOLVE: which node has that name?
 
@@ -154,10 +150,8 @@ struct Advertise {
   Direction direction = Direction::provides;
   Delivery delivery = Delivery::stream;
   std::string metadata;
-  GroupId former_group;                   ///< from before a reconnect; 0: none
-  std::uint32_t window = 0;               ///< n of delivery sync(n)
-  bool retain = false;                    ///< the hub keeps the last message for new subscribers
-  std::vector<std::byte> former_proof{};  ///< of former_group, at most kGroupProofBytesMax
+  std::uint32_t window = 0;  ///< n of delivery sync(n)
+  bool retain = false;       ///< the hub keeps the last message for new subscribers
   void write(bitestream::Writer& writer) const;
   [[nodiscard]] static Advertise read(Fields& fields);
   friend bool operator==(const Advertise&, const Advertise&) = default;
@@ -168,8 +162,6 @@ struct AdvertiseAnswer {
   static constexpr const char* kName = "answer to ADVERTISE";
   GroupId group;
   std::uint32_t subscribers = 0;
-  std::vector<std::byte>
-      proof{};  ///< opaque: that the service had the group, to show when it comes back
   void write(bitestream::Writer& writer) const;
   [[nodiscard]] static AdvertiseAnswer read(Fields& fields);
   friend bool operator==(const AdvertiseAnswer&, const AdvertiseAnswer&) = default;
@@ -246,15 +238,19 @@ struct Subscribe {
       0;  ///< of a service with sync(n): at most so many uncredited, n at most; 0: n
   std::uint32_t depth = 1;  ///< newest messages that the hub holds for it
   double rate_hz = 0.0;     ///< messages a second at most; 0: no bound
+  /// Of the subscription's counts: another one than that of the last SUBSCRIBE of this name begins
+  /// them anew.
+  std::uint8_t number = 0;
   void write(bitestream::Writer& writer) const;
   [[nodiscard]] static Subscribe read(Fields& fields);
   friend bool operator==(const Subscribe&, const Subscribe&) = default;
 };
 
-struct SubscribeAnswer {
-  static constexpr std::uint16_t kOperation = answer_of(Operation::subscribe);
-  static constexpr const char* kName = "answer to SUBSCRIBE";
-  GroupId group;  ///< 0: no such service yet
+/// What a service is at the moment, as its subscribers are told.
+struct ServiceState {
+  GroupId group;              ///< 0: none
+  NodeId provider;            ///< 0: nobody
+  std::uint64_t session = 0;  ///< of the provider: another one at each new session of a node
   std::uint32_t message_type = 0;
   std::uint32_t instance = 0;
   Delivery delivery = Delivery::stream;  ///< as sent: may be a value that is not listed
@@ -262,6 +258,15 @@ struct SubscribeAnswer {
   bool retain = false;
   Direction direction =
       Direction::provides;  ///< as sent; accepts: nothing will come, but it can be sent to
+  void write_state(bitestream::Writer& writer) const;
+  void read_state(Fields& fields);
+  friend bool operator==(const ServiceState&, const ServiceState&) = default;
+};
+
+struct SubscribeAnswer : ServiceState {
+  static constexpr std::uint16_t kOperation = answer_of(Operation::subscribe);
+  static constexpr const char* kName = "answer to SUBSCRIBE";
+  std::uint8_t number = 0;  ///< as asked
   void write(bitestream::Writer& writer) const;
   [[nodiscard]] static SubscribeAnswer read(Fields& fields);
   friend bool operator==(const SubscribeAnswer&, const SubscribeAnswer&) = default;
@@ -286,57 +291,26 @@ struct UnsubscribeAnswer {
 
 // Events
 
-/// Groups between the one that a subscriber knows and the present one of which SERVICE_MOVED tells,
-/// at most. A provider can have a new group hundreds of times a second while a subscriber is away;
-/// of what waited for it then the latest counts, and a program that starts again comes under a new
-/// group once a start.
-inline constexpr std::size_t kGroupsBetweenMax = 6;
-
-/// To subscribers, before the first frame under a new group id.
-struct ServiceMoved {
+/// To subscribers, before the first frame under another group id, and whenever the provider or the
+/// terms changed: the state of that moment.
+struct ServiceMoved : ServiceState {
   static constexpr std::uint16_t kOperation = request_of(Operation::service_moved);
   static constexpr const char* kName = "SERVICE_MOVED";
-  std::string name;   ///< full
-  GroupId old_group;  ///< 0: none
-  GroupId new_group;  ///< 0: withdrawn
-  std::uint32_t message_type = 0;
-  std::uint32_t instance = 0;
-  Delivery delivery = Delivery::stream;  ///< as sent: may be a value that is not listed
-  std::uint32_t window = 0;  ///< in force: messages that may be uncredited; 0: none is credited
-  bool retain = false;
-  bool again =
-      false;  ///< told at a return: the node may have heard of it before its connection ended
-  std::vector<GroupId>
-      between{};  ///< that the service had meanwhile, in order; messages of them may still come
-  Direction direction =
-      Direction::provides;  ///< as sent; accepts: nothing will come, but it can be sent to
+  std::string name;  ///< full
   void write(bitestream::Writer& writer) const;
   [[nodiscard]] static ServiceMoved read(Fields& fields);
   friend bool operator==(const ServiceMoved&, const ServiceMoved&) = default;
 };
 
-/// What happened to the subscribers of a service, told to its provider.
-struct SubscriberChange {
+/// How many subscribers a service has now, told to its provider.
+struct Subscribers {
+  static constexpr std::uint16_t kOperation = request_of(Operation::subscribers);
+  static constexpr const char* kName = "SUBSCRIBERS";
   GroupId group;
-  NodeId node;
-  std::uint32_t subscribers = 0;  ///< now
+  std::uint32_t subscribers = 0;
   void write(bitestream::Writer& writer) const;
-  void read_into(Fields& fields);
-  friend bool operator==(const SubscriberChange&, const SubscriberChange&) = default;
-};
-
-struct SubscriberJoined : SubscriberChange {
-  static constexpr std::uint16_t kOperation = request_of(Operation::subscriber_joined);
-  static constexpr const char* kName = "SUBSCRIBER_JOINED";
-  [[nodiscard]] static SubscriberJoined read(Fields& fields);
-  friend bool operator==(const SubscriberJoined&, const SubscriberJoined&) = default;
-};
-
-struct SubscriberLeft : SubscriberChange {
-  static constexpr std::uint16_t kOperation = request_of(Operation::subscriber_left);
-  static constexpr const char* kName = "SUBSCRIBER_LEFT";
-  [[nodiscard]] static SubscriberLeft read(Fields& fields);
-  friend bool operator==(const SubscriberLeft&, const SubscriberLeft&) = default;
+  [[nodiscard]] static Subscribers read(Fields& fields);
+  friend bool operator==(const Subscribers&, const Subscribers&) = default;
 };
 
 }  // namespace gimnet::proto::ns

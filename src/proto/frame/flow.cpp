@@ -73,6 +73,7 @@ struct Encoder {
   }
   std::size_t operator()(const Credit& credit) const {
     store_operation(bytes, Operation::credit, kCountSize);
+    bytes[1] = static_cast<std::byte>(credit.number);
     store_le(bytes + 4, credit.group.value());
     store_le(bytes + 8, credit.taken);
     return kCountSize;
@@ -122,7 +123,8 @@ std::optional<Message> decode(std::span<const std::byte> payload) {
       return Pong{load_le<std::uint32_t>(bytes + 4), load_le<std::int64_t>(bytes + 8),
                   load_le<std::int64_t>(bytes + 16)};
     case Operation::credit:
-      return Credit{GroupId{load_le<std::uint32_t>(bytes + 4)}, load_le<std::uint64_t>(bytes + 8)};
+      return Credit{GroupId{load_le<std::uint32_t>(bytes + 4)}, load_le<std::uint64_t>(bytes + 8),
+                    static_cast<std::uint8_t>(bytes[1])};
     case Operation::pause:
       if (const auto target = load_target(bytes)) return Pause{*target};
       return std::nullopt;

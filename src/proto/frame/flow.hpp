@@ -44,6 +44,7 @@ struct Pong {
 struct Credit {
   GroupId group;
   std::uint64_t taken = 0;
+  std::uint8_t number = 0;  ///< of the counts, as the SUBSCRIBE said that began them
   friend constexpr bool operator==(const Credit&, const Credit&) = default;
 };
 

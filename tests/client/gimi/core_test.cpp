@@ -222,6 +222,7 @@ TEST_F(Lost, MessagesOnTheirWayWhenASubscriptionEndedAreNotCounted) {
   ASSERT_TRUE(hub_.next_request<proto::ns::Subscribe>(number));
   proto::ns::SubscribeAnswer answer;
   answer.group = GroupId{kGroup};
+  answer.provider = NodeId{kPeerId};
   hub_.send_control(proto::Kind::ns, proto::encode_answer(answer, number));
   asking.join();
   std::thread leaving([&] { scan.reset(); });

@@ -33,6 +33,7 @@ class LeftSubscriptions : public testing::Test {
     EXPECT_EQ(request->window, window);
     ns::SubscribeAnswer answer;
     answer.group = GroupId{kGroup};
+    answer.provider = NodeId{nif::test::kPeerId};
     const proto::ControlHeader header{ns::Subscribe::kOperation, number};
     connected_.hub.send_control(proto::Kind::ns,
                                 status == proto::Status::done

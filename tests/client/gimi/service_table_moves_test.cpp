@@ -131,6 +131,7 @@ class MovedServices : public Conversation, public testing::WithParamInterface<co
     }
     ns::SubscribeAnswer answer;
     answer.group = GroupId{group};
+    answer.provider = NodeId{kPeerId};
     return proto::encode_answer(answer, number);
   }
 
@@ -187,12 +188,9 @@ TEST_P(MovedOwnServices, CountTheirOwnSubscribers) {
   const Publisher odometry = advertise("odom", kFirst);
   const Publisher map = advertise("map", kSecond);
   come_back<ns::Advertise>({{"odom", kSecond}, {"map", kFirst}});
-  ns::SubscriberJoined joined;
   for (const auto& [group, count] :
        std::map<std::uint32_t, std::uint32_t>{{kFirst, 5}, {kSecond, 6}}) {
-    joined.group = GroupId{group};
-    joined.subscribers = count;
-    hub_.send_control(proto::Kind::ns, proto::encode(joined));
+    hub_.send_control(proto::Kind::ns, proto::encode(ns::Subscribers{GroupId{group}, count}));
   }
   settle_down();
   EXPECT_EQ(map.subscribers(), 5u);
@@ -205,10 +203,8 @@ TEST_P(MovedOwnServices, LearnHowManySubscribersThereAreAfterABreak) {
   const Publisher map = advertise("map", kSecond);
   resume_bytes_ = 1 << 20;
   come_back<ns::Advertise>({{"odom", kFirst}, {"map", kSecond}});
-  ns::SubscriberLeft left;
   for (const std::uint32_t group : {kFirst, kSecond}) {
-    left.group = GroupId{group};
-    hub_.send_control(proto::Kind::ns, proto::encode(left));
+    hub_.send_control(proto::Kind::ns, proto::encode(ns::Subscribers{GroupId{group}, 0}));
   }
   settle_down();
   EXPECT_EQ(odometry.subscribers(), 0u);
@@ -346,6 +342,7 @@ TEST(ServiceTable, AMoveWaitsForTheServiceThatIsJustNotReadAnyMore) {
     meanwhile();
     ns::SubscribeAnswer answer;
     answer.group = GroupId{group};
+    answer.provider = NodeId{kPeerId};
     connected.hub.send_control(proto::Kind::ns, proto::encode_answer(answer, number));
   };
   std::thread asking([&] {
@@ -359,6 +356,7 @@ TEST(ServiceTable, AMoveWaitsForTheServiceThatIsJustNotReadAnyMore) {
   nif_incoming moved{};
   moved.text = "robot/odom";
   moved.group = kSecond;
+  moved.from = kPeerId;
   answer_one(kFirst,
              [&] { EXPECT_EQ(table.on_service_moved(moved), ServiceTable::Place::not_yet); });
   asking.join();
@@ -367,29 +365,19 @@ TEST(ServiceTable, AMoveWaitsForTheServiceThatIsJustNotReadAnyMore) {
   connected.hub.close();
 }
 
-/// As many groups as a hub tells of at a return: the one that was known, those between, the present
-/// one.
-TEST_P(MovedSubscriptions, TakeWhatWaitedOfFormerGroups) {
+TEST_P(MovedSubscriptions, TakeWhatWaitedOfTheFormerGroup) {
   const Subscription odometry = subscribe("robot/odom", kFirst);
   const Subscription map = subscribe("robot/map", kSecond);
   ns::ServiceMoved moved;
   moved.name = "robot/odom";
-  moved.old_group = GroupId{kFirst};
-  for (std::uint32_t i = 0; i < ns::kGroupsBetweenMax; ++i)
-    moved.between.emplace_back((7u << 20) | (100 + i));
-  moved.new_group = GroupId{(7u << 20) | 200};
-  moved.again = true;
-  hub_.send_control(proto::Kind::ns, proto::encode(moved));
-  settle_down();
-  expect_received(odometry, kFirst);
-  for (const GroupId group : moved.between) expect_received(odometry, group.value());
-  expect_received(odometry, moved.new_group.value());
-  moved.old_group = moved.new_group;
-  moved.new_group = GroupId{(7u << 20) | 201};
-  moved.between.clear();
-  hub_.send_control(proto::Kind::ns, proto::encode(moved));
-  settle_down();
-  expect_received(odometry, (7u << 20) | 100);
+  moved.provider = NodeId{kPeerId};
+  for (const std::uint32_t next : {100u, 101u}) {
+    moved.group = GroupId{(7u << 20) | next};
+    hub_.send_control(proto::Kind::ns, proto::encode(moved));
+    settle_down();
+    expect_received(odometry, next == 100 ? kFirst : (7u << 20) | 100);
+    expect_received(odometry, moved.group.value());
+  }
   expect_received(map, kSecond);
   expect_ignored(odometry, kFirst);
   close_node();

@@ -48,6 +48,7 @@ class StreamTableTest : public Conversation {
     EXPECT_EQ(subscribe->name, kService);
     ns::SubscribeAnswer subscribed;
     subscribed.group = GroupId{kGroup};
+    subscribed.provider = NodeId{kPeerId};
     subscribed.message_type = kKey.type;
     subscribed.instance = kKey.instance;
     hub_.send_control(proto::Kind::ns, proto::encode_answer(subscribed, number));
@@ -66,11 +67,14 @@ class StreamTableTest : public Conversation {
     return *made;
   }
 
-  void move_to(std::uint32_t group, MessageKey key = kKey) {
+  /// `provider` 0: nobody provides it any more.
+  void move_to(std::uint32_t group, MessageKey key = kKey, std::uint32_t provider = kPeerId,
+               std::uint64_t session = 0) {
     ns::ServiceMoved moved;
     moved.name = kService;
-    moved.old_group = GroupId{std::exchange(group_, group)};
-    moved.new_group = GroupId{group};
+    moved.group = GroupId{group};
+    moved.provider = NodeId{provider};
+    moved.session = session;
     moved.message_type = key.type;
     moved.instance = key.instance;
     hub_.send_control(proto::Kind::ns, proto::encode(moved));
@@ -83,7 +87,6 @@ class StreamTableTest : public Conversation {
   }
 
   std::uint32_t sequence_ = 0;
-  std::uint32_t group_ = kGroup;
 };
 
 TEST_F(StreamTableTest, AServiceIsAddressedByItsGroupAndItsKey) {
@@ -172,11 +175,28 @@ TEST_F(StreamTableTest, FollowsAServiceThatMoves) {
   EXPECT_EQ(drive.counts().acknowledged, 1u);
 }
 
+TEST_F(StreamTableTest, AnotherSessionOfTheProviderKnowsNothingOfWhatWasOnItsWay) {
+  const Sender drive = to_service(2);
+  drive.send("lost").or_throw();
+  static_cast<void>(next_data());
+  move_to(kGroup, kKey, kPeerId, 9);
+  settle_down();
+  EXPECT_TRUE(drive.settle().is(Status::not_delivered));
+  EXPECT_EQ(drive.counts().lost, 1u);
+  drive.send("found").or_throw();
+  EXPECT_EQ(next_data().frame.dst, kGroup);
+  move_to(kGroup, kKey, kPeerId, 9);
+  settle_down();
+  acknowledge(2, 0, 0, kGroup);
+  EXPECT_TRUE(drive.settle().is(Status::not_delivered)) << "the first one";
+  EXPECT_EQ(drive.counts().acknowledged, 1u) << "the same session: nothing was lost";
+}
+
 TEST_F(StreamTableTest, SaysThatNobodyHasTheServiceUntilItIsBack) {
   const Sender drive = to_service(1, AtFullWindow::hold_latest);
   drive.send("waits for its ACK").or_throw();
   drive.send("held").or_throw();
-  move_to(0);
+  move_to(kGroup, kKey, 0);
   settle_down();
   EXPECT_TRUE(drive.send("x").is(Status::not_found));
   EXPECT_NE(drive.send("x").failure().sentence.find(kService), std::string::npos);

@@ -33,7 +33,7 @@ void PrintTo(const Part& part, std::ostream* out) { *out << part.recording << ",
 const std::vector<Part>& parts() {
   static const std::vector<Part> all = {
       {"version_1", {"robot"}, 3, 4, 5},
-      {"version_1", {"viewer", "again"}, 4, 12, 21},
+      {"version_1", {"viewer", "again"}, 4, 13, 21},
       {"version_1", {"admin"}, 0, 0, 4},
       {"version_1_data", {"robot"}, 0, 1, 0},
       {"version_1_data", {"viewer"}, 5, 0, 0},

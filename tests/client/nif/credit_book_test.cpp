@@ -9,7 +9,7 @@
 
 #include "proto/control/ns.hpp"
 #include "proto/frame/fragment_header.hpp"
-#include "tests/client/nif/support/fake_hub.hpp"
+#include "tests/client/nif/support/declaring.hpp"
 
 // Through the whole library, with a hub that a test plays: what is credited when.
 
@@ -26,11 +26,13 @@ constexpr std::uint32_t kGroup = (7u << 20) | 5;
 
 void answer_subscribe(FakeConnection& hub, std::uint32_t window, std::uint32_t group = kGroup) {
   std::uint16_t number = 0;
-  ASSERT_TRUE(hub.next_request<proto::ns::Subscribe>(number));
+  const auto request = hub.next_request<proto::ns::Subscribe>(number);
+  ASSERT_TRUE(request);
   proto::ns::SubscribeAnswer answer;
   answer.group = GroupId{group};
   answer.delivery = proto::ns::Delivery::sync;
   answer.window = window;
+  answer.number = request->number;
   hub.send_control(proto::Kind::ns, proto::encode_answer(answer, number));
 }
 
@@ -117,27 +119,15 @@ void subscribe_late(Connected& connected, std::uint32_t window) {
   asking.join();
 }
 
-TEST(CreditBook, CountsWhatCameBeforeTheAnswer) {
+TEST(CreditBook, CountsFromTheAnswer) {
   FakeHub hub;
   Connected connected = connect_to(hub, test::default_options(), make_welcome());
-  subscribe_late(connected, 1);
-  static_cast<void>(take(connected.node.get()));
-  EXPECT_EQ(credited(connected.hub), 1u) << "the window would be shut for ever";
-  publish(connected.hub);
-  static_cast<void>(take(connected.node.get()));
-  EXPECT_EQ(credited(connected.hub), 2u);
-}
-
-TEST(CreditBook, DoesNotCreditWhatCameBeforeAnAnswerWithoutAWindow) {
-  FakeHub hub;
-  Connected connected = connect_to(hub, test::default_options(), make_welcome());
-  subscribe_late(connected, 0);
-  publish(connected.hub);
-  static_cast<void>(take(connected.node.get()));
-  EXPECT_EQ(take(connected.node.get()).epoch, 0u);
-  subscribe(connected, 1);
-  publish(connected.hub);
-  static_cast<void>(take(connected.node.get()));
+  for (const std::uint32_t window : {0u, 1u}) {
+    subscribe_late(connected, window);
+    EXPECT_EQ(take(connected.node.get()).epoch, 0u) << "the hub does not count it either";
+    publish(connected.hub);
+    EXPECT_EQ(take(connected.node.get()).epoch != 0, window != 0);
+  }
   EXPECT_EQ(credited(connected.hub), 1u);
 }
 
@@ -207,8 +197,6 @@ TEST(CreditBook, AResumedOneRepeatsItsTotals) {
   EXPECT_EQ(credited(connected.hub), 1u);
 }
 
-/// A service came back under kMovedGroup while the node was away: its first messages come before
-/// anything is declared.
 constexpr std::uint32_t kMovedGroup = kGroup + 1;
 
 FakeConnection come_back_resumed(FakeHub& hub) {
@@ -224,78 +212,29 @@ std::uint64_t credited_of(FakeConnection& hub, std::uint32_t group) {
   return 0;
 }
 
-TEST(CreditBook, CountsWhatComesBeforeASubscriptionIsDeclaredAgain) {
-  constexpr int kServices = 40;  // they are declared first, and not all at once
-  FakeHub hub;
-  Connected connected = connect_to(hub, test::default_options("robot"), make_welcome(1 << 20));
-  const auto answer_advertise = [&](std::uint32_t i) {
-    std::uint16_t number = 0;
-    ASSERT_TRUE(connected.hub.next_request<proto::ns::Advertise>(number));
-    proto::ns::AdvertiseAnswer answer;
-    answer.group = GroupId{kGroup + 100 + i};
-    connected.hub.send_control(proto::Kind::ns, proto::encode_answer(answer, number));
-  };
-  for (std::uint32_t i = 0; i < kServices; ++i) {
-    std::thread asking([&] {
-      const std::string name = "s" + std::to_string(i);
-      nif_service service{};
-      service.struct_size = sizeof service;
-      service.name = name.c_str();
-      std::uint32_t group = 0;
-      EXPECT_EQ(nif_advertise(connected.node.get(), &service, &group, nullptr, NIF_FOREVER),
-                NIF_OK);
-    });
-    answer_advertise(i);
-    asking.join();
-  }
-  subscribe(connected, 1);
-  publish(connected.hub);
-  static_cast<void>(take(connected.node.get()));
-  EXPECT_EQ(credited(connected.hub), 1u);
-  connected.hub.close();
-  connected.hub = come_back_resumed(hub);
-  publish(connected.hub, kMovedGroup);
-  EXPECT_NE(take(connected.node.get()).epoch, 0u) << "before any SUBSCRIBE was sent";
-  for (std::uint32_t i = 0; i < kServices; ++i) answer_advertise(i);
-  answer_subscribe(connected.hub, 1, kMovedGroup);
-  EXPECT_EQ(credited_of(connected.hub, kMovedGroup), 1u) << "the window would be shut for ever";
-  // The former group is gone, and nothing is told of it any more.
-  connected.hub.close();
-  connected.hub = come_back_resumed(hub);
-  const auto repeated = connected.hub.next_flow<proto::flow::Credit>();
-  ASSERT_TRUE(repeated);
-  EXPECT_EQ(repeated->group, GroupId{kMovedGroup});
-}
-
-TEST(CreditBook, CountsWhatComesBeforeASubscribeThatBrokeIsAskedAgain) {
-  FakeHub hub;
-  Connected connected = connect_to(hub, test::default_options("robot"), make_welcome(1 << 20));
-  std::thread asking([&] {
-    EXPECT_EQ(nif_subscribe(connected.node.get(), "peer/scan", nullptr, NIF_FOREVER), NIF_OK);
-  });
-  std::uint16_t number = 0;
-  EXPECT_TRUE(connected.hub.next_request<proto::ns::Subscribe>(number));
-  connected.hub.close();  // it has heard the SUBSCRIBE, and nobody its answer
-  connected.hub = come_back_resumed(hub);
-  publish(connected.hub);
-  static_cast<void>(take(connected.node.get()));
-  answer_subscribe(connected.hub, 1);
-  EXPECT_EQ(credited(connected.hub), 1u) << "the window would be shut for ever";
-  answer_subscribe(connected.hub, 1);  // a call that was asked on two connections asks once more
-  asking.join();
-}
-
-TEST(CreditBook, FormerGroupsMakeWay) {
-  constexpr std::uint32_t kGroups = 4096;
+TEST(CreditBook, AChangeOfTheWindowLetsTheCountsGoOnAndAnotherSubscriptionBeginsThemAnew) {
   FakeHub hub;
   Connected connected = connect_to(hub, test::default_options(), make_welcome());
-  for (std::uint32_t i = 1; i <= kGroups; ++i) {
-    publish(connected.hub, kGroup + i);
-    EXPECT_NE(take(connected.node.get()).epoch, 0u);
-  }
-  subscribe_late(connected, 1);
-  static_cast<void>(take(connected.node.get()));
-  EXPECT_EQ(credited(connected.hub), 1u);
+  subscribe(connected, 2);
+  const auto take_one = [&] {
+    publish(connected.hub);
+    static_cast<void>(take(connected.node.get()));
+    return *connected.hub.next_flow<proto::flow::Credit>();
+  };
+  const proto::flow::Credit first = take_one();
+  EXPECT_EQ(first.taken, 1u);
+  subscribe(connected, 1);
+  const proto::flow::Credit second = take_one();
+  EXPECT_EQ(second.taken, 2u);
+  EXPECT_EQ(second.number, first.number);
+  std::thread ending(
+      [&] { EXPECT_EQ(nif_unsubscribe(connected.node.get(), "peer/scan", NIF_FOREVER), NIF_OK); });
+  test::answer_unsubscribe(connected.hub, true);
+  ending.join();
+  subscribe(connected, 1);
+  const proto::flow::Credit anew = take_one();
+  EXPECT_EQ(anew.taken, 1u);
+  EXPECT_NE(anew.number, first.number) << "a late CREDIT of the former one must not count";
 }
 
 TEST(CreditBook, AGroupWithoutAWindowMayHaveOneAfterABreak) {
@@ -306,25 +245,32 @@ TEST(CreditBook, AGroupWithoutAWindowMayHaveOneAfterABreak) {
   EXPECT_EQ(take(connected.node.get()).epoch, 0u);
   connected.hub.close();
   connected.hub = come_back_resumed(hub);
+  answer_subscribe(connected.hub, 1);
   publish(connected.hub);
   static_cast<void>(take(connected.node.get()));
-  answer_subscribe(connected.hub, 1);
   EXPECT_EQ(credited(connected.hub), 1u);
 }
 
+struct Asked {
+  std::uint16_t request = 0;
+  std::uint8_t number = 0;
+};
+
 /// The next request is SUBSCRIBE of `name`; its answer has to wait for its turn.
-std::uint16_t subscribe_of(FakeConnection& hub, const std::string& name) {
-  std::uint16_t number = 0;
-  const auto request = hub.next_request<proto::ns::Subscribe>(number);
+Asked subscribe_of(FakeConnection& hub, const std::string& name) {
+  Asked asked;
+  const auto request = hub.next_request<proto::ns::Subscribe>(asked.request);
   EXPECT_TRUE(request && request->name == name);
-  return number;
+  if (request) asked.number = request->number;
+  return asked;
 }
 
-void give(FakeConnection& hub, std::uint16_t number, std::uint32_t group) {
+void give(FakeConnection& hub, Asked asked, std::uint32_t group) {
   proto::ns::SubscribeAnswer answer;
   answer.group = GroupId{group};
   answer.window = 1;
-  hub.send_control(proto::Kind::ns, proto::encode_answer(answer, number));
+  answer.number = asked.number;
+  hub.send_control(proto::Kind::ns, proto::encode_answer(answer, asked.request));
 }
 
 /// A hub that began anew gives two services other groups, of the same numbers.
@@ -344,8 +290,8 @@ void swap_groups(bool first_answers_first, std::uint32_t first_group, std::uint3
   }
   connected.hub.close();
   connected.hub = hub.admit(make_welcome());
-  const std::uint16_t first = subscribe_of(connected.hub, "peer/a");
-  const std::uint16_t second = subscribe_of(connected.hub, "peer/b");
+  const Asked first = subscribe_of(connected.hub, "peer/a");
+  const Asked second = subscribe_of(connected.hub, "peer/b");
   if (first_answers_first) give(connected.hub, first, first_group);
   give(connected.hub, second, second_group);
   if (!first_answers_first) give(connected.hub, first, first_group);

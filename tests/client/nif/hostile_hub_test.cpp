@@ -209,7 +209,7 @@ TEST(HostileHub, EventsThatLieEndTheConnectionOrAreSkipped) {
 TEST(HostileHub, AnEventThatIsCutAnywhereEndsTheConnection) {
   proto::ns::ServiceMoved moved;
   moved.name = "robot/odom";
-  moved.new_group = GroupId{kPeerId};
+  moved.group = GroupId{kPeerId};
   const proto::Payload whole = proto::encode(moved);
   for (std::size_t cut = 0; cut < whole.size(); ++cut) {
     Receiving receiving;

@@ -220,21 +220,18 @@ TEST(Inbound, DeliversEventsInOrderWithMessages) {
   std::vector<std::byte> bytes;
   proto::ns::ServiceMoved moved;
   moved.name = "robot/odom";
-  moved.old_group = GroupId{1};
-  moved.new_group = GroupId{2};
+  moved.group = GroupId{2};
+  moved.provider = NodeId{kPeerId};
   add_control(bytes, proto::Kind::ns, proto::encode(moved));
   add_frame(bytes, from_peer(proto::Kind::group, 2), "first");
-  proto::ns::SubscriberJoined joined;
-  joined.group = GroupId{3};
-  joined.node = NodeId{kPeerId};
-  joined.subscribers = 4;
-  add_control(bytes, proto::Kind::ns, proto::encode(joined));
+  add_control(bytes, proto::Kind::ns, proto::encode(proto::ns::Subscribers{GroupId{3}, 4}));
   ASSERT_EQ(receiving.feed(bytes), Inbound::Verdict::going);
   ASSERT_EQ(receiving.host.items.size(), 3u);
   EXPECT_EQ(receiving.host.items[0].type, static_cast<std::uint32_t>(NIF_SERVICE_MOVED));
   EXPECT_STREQ(receiving.host.items[0].text, "robot/odom");
+  EXPECT_EQ(receiving.host.items[0].from, kPeerId);
   EXPECT_EQ(receiving.host.items[1].type, static_cast<std::uint32_t>(NIF_MESSAGE));
-  EXPECT_EQ(receiving.host.items[2].type, static_cast<std::uint32_t>(NIF_SUBSCRIBER_JOINED));
+  EXPECT_EQ(receiving.host.items[2].type, static_cast<std::uint32_t>(NIF_SUBSCRIBERS));
   EXPECT_EQ(receiving.host.items[2].count, 4u);
 }
 

@@ -320,7 +320,6 @@ TEST(Node, DeclaresServicesAndSubscriptionsAgain) {
     const auto advertise = to.next_request<proto::ns::Advertise>(number);
     ASSERT_TRUE(advertise);
     EXPECT_EQ(advertise->service, "odom");
-    EXPECT_EQ(advertise->former_group.value(), own_group == 11 ? 0u : 11u);
     to.send_control(
         proto::Kind::ns,
         proto::encode_answer(proto::ns::AdvertiseAnswer{GroupId{own_group}, 0}, number));
@@ -329,6 +328,7 @@ TEST(Node, DeclaresServicesAndSubscriptionsAgain) {
     EXPECT_EQ(subscribe->name, "peer/scan");
     proto::ns::SubscribeAnswer subscribed;
     subscribed.group = GroupId{peer_group};
+    subscribed.provider = NodeId{kPeerId};
     to.send_control(proto::Kind::ns, proto::encode_answer(subscribed, number));
   };
   answer(connected.hub, 11, 21);
@@ -341,9 +341,9 @@ TEST(Node, DeclaresServicesAndSubscriptionsAgain) {
   const nif_incoming own = expect(node, NIF_OWN_SERVICE_MOVED);
   EXPECT_EQ(own.former_group, 11u);
   EXPECT_EQ(own.group, 12u);
-  EXPECT_EQ(expect(node, NIF_SUBSCRIBER_JOINED).group, 12u) << "how many there are now";
+  EXPECT_EQ(expect(node, NIF_SUBSCRIBERS).group, 12u) << "how many there are now";
   const nif_incoming peer = expect(node, NIF_SERVICE_MOVED);
-  EXPECT_EQ(peer.former_group, 21u);
+  EXPECT_EQ(peer.from, kPeerId);
   EXPECT_EQ(peer.group, 22u);
 }
 

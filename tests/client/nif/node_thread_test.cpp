@@ -188,7 +188,7 @@ TEST(NodeThread, TellsEventsAndMessagesInTheOrderInWhichTheyCame) {
   add_message(bytes, "3");
   connected.hub.send(bytes);
   for (const auto type : {NIF_DISCONNECTED, NIF_CONNECTED, NIF_MESSAGE, NIF_OWN_SERVICE_MOVED,
-                          NIF_SUBSCRIBER_JOINED, NIF_MESSAGE, NIF_SERVICE_MOVED, NIF_MESSAGE}) {
+                          NIF_SUBSCRIBERS, NIF_MESSAGE, NIF_SERVICE_MOVED, NIF_MESSAGE}) {
     nif_incoming in;
     ASSERT_EQ(nif_receive(node, &in, NIF_FOREVER), NIF_OK);
     EXPECT_EQ(in.type, static_cast<std::uint32_t>(type));

@@ -37,6 +37,9 @@ TEST(OutboundConnection, WithResumeItGoesToTheNextConnection) {
   line.outbound.detach(true);
   line.attach(Line::session_of(true));
   EXPECT_EQ(line.outbound.flush(), NIF_OK);
+  EXPECT_TRUE(line.read().empty()) << "nobody knows yet where the services are";
+  EXPECT_EQ(line.outbound.readdress({}), 0u);
+  line.outbound.end_declaring();
   EXPECT_EQ(payloads(line.read()), std::vector<std::string>{"kept"});
 }
 

@@ -195,6 +195,8 @@ TEST(SendQueue, ANewEpochKeepsWhatWaitsUnderTheNewId) {
   put(queue, NIF_NORMAL, "kept");
   queue.disconnect();
   queue.restart(99);
+  EXPECT_TRUE(queue.gather().empty()) << "nobody knows yet where the services are";
+  EXPECT_EQ(queue.go_on({}), 0u);
   const auto written = write_all(queue);
   EXPECT_EQ(payloads(written), (std::vector<std::string>{"kept"}));
   EXPECT_EQ(proto::load_header(written.data()).src, 99u);
@@ -216,6 +218,7 @@ TEST(SendQueue, ANewEpochAfterAResumeKeepsTheOrderOfEachLane) {
   put(queue, NIF_NORMAL, "second");
   queue.disconnect();
   queue.restart(99);
+  EXPECT_EQ(queue.go_on({}), 0u);
   EXPECT_EQ(payloads(write_all(queue)), (std::vector<std::string>{"first", "second", "behind"}));
 }
 

@@ -22,7 +22,6 @@ using test::make_welcome;
 namespace ns = proto::ns;
 
 constexpr std::uint32_t kKnown = (7u << 20) | 5;
-constexpr std::uint32_t kBetween = (7u << 20) | 6;
 constexpr std::uint32_t kPresent = (7u << 20) | 7;
 
 class ToldAgain : public ::testing::Test {
@@ -38,13 +37,22 @@ class ToldAgain : public ::testing::Test {
     answer_subscribe(kKnown);
     asking.join();
   }
-  void answer_subscribe(std::uint32_t group) {
+  /// `provider` 0: nobody provides it.
+  void answer_subscribe(std::uint32_t group, std::uint32_t provider = test::kPeerId) {
     std::uint16_t number = 0;
-    ASSERT_TRUE(connected_.hub.next_request<ns::Subscribe>(number));
-    ns::SubscribeAnswer answer;
-    answer.group = GroupId{group};
-    answer.window = group != 0 ? 2 : 0;
+    const auto request = connected_.hub.next_request<ns::Subscribe>(number);
+    ASSERT_TRUE(request);
+    ns::SubscribeAnswer answer{state(group, provider)};
+    answer.number = request->number;
     connected_.hub.send_control(proto::Kind::ns, proto::encode_answer(answer, number));
+  }
+  static ns::ServiceState state(std::uint32_t group, std::uint32_t provider) {
+    ns::ServiceState state;
+    state.group = GroupId{group};
+    state.provider = NodeId{provider};
+    state.session = provider != 0 ? 3 : 0;
+    state.window = group != 0 ? 2 : 0;
+    return state;
   }
   void come_back() {
     connected_.hub.close();
@@ -54,16 +62,9 @@ class ToldAgain : public ::testing::Test {
     EXPECT_EQ(next().type, NIF_DISCONNECTED);
     EXPECT_EQ(next().type, NIF_CONNECTED);
   }
-  void tell(std::uint32_t old_group, std::uint32_t new_group, bool again,
-            std::vector<GroupId> between = {}) {
-    ns::ServiceMoved event;
-    event.name = "peer/scan";
-    event.old_group = GroupId{old_group};
-    event.new_group = GroupId{new_group};
-    event.window = new_group != 0 ? 2 : 0;
-    event.again = again;
-    event.between = std::move(between);
-    connected_.hub.send_control(proto::Kind::ns, proto::encode(event));
+  void tell(std::uint32_t group, std::uint32_t provider = test::kPeerId) {
+    connected_.hub.send_control(
+        proto::Kind::ns, proto::encode(ns::ServiceMoved{state(group, provider), "peer/scan"}));
   }
   void publish(std::uint32_t group) {
     proto::FrameParts parts;
@@ -78,11 +79,12 @@ class ToldAgain : public ::testing::Test {
     nif_release(&in);
     return in;
   }
-  void expect_moved(std::uint32_t from, std::uint32_t to) {
+  void expect_moved(std::uint32_t group, std::uint32_t provider = test::kPeerId) {
     const nif_incoming in = next();
     EXPECT_EQ(in.type, NIF_SERVICE_MOVED);
-    EXPECT_EQ(in.former_group, from);
-    EXPECT_EQ(in.group, to);
+    EXPECT_EQ(in.group, group);
+    EXPECT_EQ(in.from, provider);
+    EXPECT_EQ(in.count, provider != 0 ? 3u : 0u) << "the provider's session";
   }
   void expect_message(std::uint32_t group) {
     const nif_incoming in = next();
@@ -102,28 +104,28 @@ class ToldAgain : public ::testing::Test {
 
 TEST_F(ToldAgain, ComesBeforeWhatWaited) {
   come_back();
-  tell(kKnown, kPresent, true, {GroupId{kBetween}});
-  for (const std::uint32_t group : {kKnown, kBetween, kPresent}) publish(group);
+  tell(kPresent);
+  for (const std::uint32_t group : {kKnown, kPresent}) publish(group);
   answer_subscribe(kPresent);
-  expect_moved(kKnown, kBetween);
-  expect_moved(kBetween, kPresent);
-  for (const std::uint32_t group : {kKnown, kBetween, kPresent}) expect_message(group);
+  expect_moved(kPresent);
+  for (const std::uint32_t group : {kKnown, kPresent}) expect_message(group);
   EXPECT_EQ(credited(kPresent), 1u);
   publish(kPresent);
   expect_message(kPresent);  // the answer brought nothing new
 }
 
-TEST_F(ToldAgain, IsNothingToWhoKnowsIt) {
-  tell(kKnown, kPresent, false);
-  expect_moved(kKnown, kPresent);
+TEST_F(ToldAgain, CountsGoOn) {
+  tell(kPresent);
+  expect_moved(kPresent);
   for (std::uint64_t i = 1; i <= 3; ++i) {
     publish(kPresent);
     expect_message(kPresent);
     EXPECT_EQ(credited(kPresent), i);
   }
   come_back();
-  tell(kKnown, kPresent, true, {GroupId{kBetween}});
+  tell(kPresent);
   answer_subscribe(kPresent);
+  expect_moved(kPresent);
   publish(kPresent);
   expect_message(kPresent);
   std::uint64_t last = credited(kPresent);
@@ -134,22 +136,11 @@ TEST_F(ToldAgain, IsNothingToWhoKnowsIt) {
 
 TEST_F(ToldAgain, OfAServiceThatIsGone) {
   come_back();
-  tell(kKnown, 0, true);
-  answer_subscribe(0);
+  tell(kKnown, 0);
+  answer_subscribe(kKnown, 0);
   expect_moved(kKnown, 0);
-  come_back();
-  tell(kKnown, 0, true);
-  answer_subscribe(0);
-  come_back();
-  tell(0, 0, true, {GroupId{kBetween}});
-  answer_subscribe(0);
-  expect_moved(0, kBetween);  // of which something may wait
-  expect_moved(kBetween, 0);
-}
-
-TEST_F(ToldAgain, AnEventThatIsNotRepeatedIsAlwaysNews) {
-  tell(kKnown, kKnown, false);
-  expect_moved(kKnown, kKnown);
+  publish(kKnown);
+  expect_message(kKnown);  // which waited
 }
 
 TEST_F(ToldAgain, HowManySubscribersThereAre) {
@@ -178,7 +169,7 @@ TEST_F(ToldAgain, HowManySubscribersThereAre) {
     answer_subscribe(kKnown);
     if (direction == NIF_PROVIDES) {
       const nif_incoming in = next();
-      EXPECT_EQ(in.type, NIF_SUBSCRIBER_JOINED);
+      EXPECT_EQ(in.type, NIF_SUBSCRIBERS);
       EXPECT_EQ(in.group, kPresent);
       EXPECT_EQ(in.from, 0u);
       EXPECT_EQ(in.count, 3u);

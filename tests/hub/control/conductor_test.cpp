@@ -191,10 +191,9 @@ TEST_F(ConductorTest, ASubscriberIsPublishedBeforeItsAnswerLeaves) {
   ASSERT_TRUE(subscribed);
   EXPECT_EQ(subscribed->group, group->group);
   EXPECT_TRUE(published_at_answer);
-  const auto joined = events<ns::SubscriberJoined>();
-  ASSERT_EQ(joined.size(), 1u);
-  EXPECT_EQ(joined[0].node, viewer.id);
-  EXPECT_EQ(joined[0].subscribers, 1u);
+  const auto told = events<ns::Subscribers>();
+  ASSERT_EQ(told.size(), 1u);
+  EXPECT_EQ(told[0], (ns::Subscribers{group->group, 1}));
 }
 
 TEST_F(ConductorTest, SubscribersHearOfANewGroupBeforeItsProviderMaySend) {
@@ -210,8 +209,9 @@ TEST_F(ConductorTest, SubscribersHearOfANewGroupBeforeItsProviderMaySend) {
   const auto moved = events<ns::ServiceMoved>();
   ASSERT_EQ(moved.size(), 1u);
   EXPECT_EQ(moved[0].name, "robot/odom");
-  EXPECT_EQ(moved[0].old_group, GroupId{});
-  EXPECT_EQ(moved[0].new_group, group->group);
+  EXPECT_EQ(moved[0].group, group->group);
+  EXPECT_EQ(moved[0].provider, robot.id);
+  EXPECT_NE(moved[0].session, 0u);
   EXPECT_EQ(moved[0].message_type, 5u);
   EXPECT_EQ(std::get<SendControlCommand>(shards.sent[0].command).session.generation,
             viewer.session.generation);

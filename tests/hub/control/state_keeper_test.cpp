@@ -38,7 +38,6 @@ TEST_F(StateKeeperTest, KeepsWhatIsToOutliveTheHubBesideWhatStays) {
   EXPECT_EQ(kept_[0].boot, 3u);
   EXPECT_EQ(kept_[0].node_mark, membership_.durable(1s).nodes.mark);
   EXPECT_EQ(kept_[0].nodes_used, membership_.durable(1s).nodes.used);
-  EXPECT_EQ(kept_[0].groups_used, membership_.durable(1s).groups.used);
   EXPECT_EQ(keeper_.state(), kept_[0]);
   EXPECT_EQ(keeper_.again_at(), std::nullopt);
 }

@@ -74,26 +74,23 @@ TEST_F(TablePublisherTest, PublishesWhichServicesTakeData) {
   EXPECT_TRUE(groups_.find(2)->accepts);
 }
 
-TEST_F(TablePublisherTest, AGroupEndsInTwoStepsWhereItHasMembersElsewhere) {
+TEST_F(TablePublisherTest, AnotherProviderIsPublishedAloneAndTheMembersStay) {
   const Session& robot = join("robot");
   const Session& far = join("far");
-  const Session& near = join("near");
-  ASSERT_NE(robot.place.shard, far.place.shard);
-  ASSERT_EQ(robot.place.shard, near.place.shard);
   ASSERT_TRUE(membership_.services().advertise(robot.index, "robot/odom", {}, 0ms, effects_));
-  subscribe(near, "robot/odom");
-  publisher_.publish_group(GroupIndex{1}, membership_);
-  EXPECT_FALSE(publisher_.end_group(GroupIndex{1})) << "nothing can be on its way";
-  EXPECT_EQ(groups_.find(1), nullptr);
   subscribe(far, "robot/odom");
-  publisher_.publish_group(GroupIndex{1}, membership_);
-  EXPECT_EQ(publisher_.end_group(GroupIndex{1}), robot.place.shard);
-  ASSERT_NE(groups_.find(1), nullptr);
-  EXPECT_TRUE(groups_.find(1)->ends());
+  publisher_.publish_provider(GroupIndex{1}, membership_);
+  ASSERT_NE(groups_.find(1), nullptr) << "all of it, where nothing was published";
+  EXPECT_TRUE(groups_.find(1)->provided());
+  ASSERT_FALSE(membership_.services().withdraw(robot.index, GroupIndex{1}, 0ms, effects_));
+  publisher_.publish_provider(GroupIndex{1}, membership_);
+  EXPECT_FALSE(groups_.find(1)->provided());
+  EXPECT_FALSE(groups_.find(1)->provider_place.exists());
   EXPECT_EQ(groups_.find(1)->by_shard[far.place.shard.value()].size(), 1u);
-  publisher_.clear_group(GroupIndex{1});
-  EXPECT_EQ(groups_.find(1), nullptr);
-  EXPECT_FALSE(publisher_.end_group(GroupIndex{1}));
+  ASSERT_TRUE(membership_.services().advertise(far.index, "robot/odom", {}, 0ms, effects_));
+  publisher_.publish_provider(GroupIndex{1}, membership_);
+  EXPECT_EQ(index_of(groups_.find(1)->provider), far.index.value());
+  EXPECT_EQ(groups_.find(1)->provider_place.shard, far.place.shard);
 }
 
 TEST_F(TablePublisherTest, OneMemberMoreOrLessIsPublishedAloneAndTheListBeforeStaysAsItWas) {
@@ -113,7 +110,7 @@ TEST_F(TablePublisherTest, OneMemberMoreOrLessIsPublishedAloneAndTheListBeforeSt
   EXPECT_TRUE(before->by_shard[near.place.shard.value()].empty()) << "its own effect is to come";
   ASSERT_TRUE(publisher_.publish_member(GroupIndex{1}, near.index, membership_));
   EXPECT_EQ(groups_.find(1)->by_shard[near.place.shard.value()].size(), 1u);
-  ASSERT_FALSE(membership_.services().unsubscribe(far.index, "robot/odom", effects_));
+  ASSERT_FALSE(membership_.services().unsubscribe(far.index, "robot/odom", 0ms, effects_));
   ASSERT_TRUE(publisher_.publish_member(GroupIndex{1}, far.index, membership_));
   EXPECT_TRUE(groups_.find(1)->by_shard[far.place.shard.value()].empty());
   EXPECT_EQ(before->by_shard[far.place.shard.value()].size(), 1u);
@@ -139,7 +136,7 @@ TEST_F(TablePublisherTest, AMemberThatIsPacedIsInTheOtherList) {
   ASSERT_NE(paced(), nullptr);
   EXPECT_TRUE(paced()->was_plain);
   EXPECT_TRUE(groups_.find(1)->by_shard[viewer.place.shard.value()].empty());
-  ASSERT_FALSE(membership_.services().unsubscribe(viewer.index, "robot/odom", effects_));
+  ASSERT_FALSE(membership_.services().unsubscribe(viewer.index, "robot/odom", 0ms, effects_));
   ASSERT_TRUE(publisher_.publish_member(GroupIndex{1}, viewer.index, membership_));
   EXPECT_TRUE(groups_.find(1)->paced_by_shard.empty()) << "a group without any pays nothing for it";
 }
@@ -178,11 +175,14 @@ TEST_F(TablePublisherTest, FreesOldMembersOnlyWhenNoShardCanLookAtThem) {
   EXPECT_EQ(publisher_.garbage(), 0u);
 }
 
-TEST_F(TablePublisherTest, AWithdrawnGroupIsNoGroup) {
+TEST_F(TablePublisherTest, AGroupThatWasGivenBackIsNoGroup) {
   const Session& robot = join("robot");
   ASSERT_TRUE(membership_.services().advertise(robot.index, "robot/odom", {}, 0ms, effects_));
   publisher_.publish_group(GroupIndex{1}, membership_);
   ASSERT_FALSE(membership_.services().withdraw(robot.index, GroupIndex{1}, 0ms, effects_));
+  publisher_.publish_group(GroupIndex{1}, membership_);
+  EXPECT_FALSE(groups_.find(1)->provided());
+  membership_.services().tick(24h, effects_);
   publisher_.publish_group(GroupIndex{1}, membership_);
   EXPECT_EQ(groups_.find(1), nullptr);
   EXPECT_EQ(publisher_.garbage(), 0u);

@@ -1,8 +1,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <utility>
 #include <vector>
 
 #include "proto/control/ctrl.hpp"
@@ -16,7 +14,6 @@
 namespace gimnet::hub {
 namespace {
 
-using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 namespace ns = proto::ns;
 
@@ -53,95 +50,45 @@ class ToldAgainTest : public ::testing::Test {
     }
     return events;
   }
-  std::uint64_t last_move() const {
-    std::uint64_t move = 0;
-    for (const auto* command : hub_.shards.all<SendControlCommand>())
-      move = std::max(move, command->move);
-    return move;
-  }
-  void read(std::uint64_t move, std::uint32_t attachment) {
-    hub_.conductor.on_event(
-        {viewer_.shard, MovesReadEvent{viewer_.session, attachment, viewer_.id, move}}, hub_.now);
-  }
-
   TestConductor hub_;
   TestConductor::Node robot_;
   TestConductor::Node viewer_;
   GroupId first_;
 };
 
-TEST_F(ToldAgainTest, WhatMovedWhileTheNodeWasAway) {
+TEST_F(ToldAgainTest, WhatChangedWhileTheNodeWasAwayIsToldAsItIsNow) {
   hub_.detach(viewer_);
-  const GroupId between = advertise(6);
+  advertise(6);
   const GroupId present = advertise(7);
   EXPECT_THAT(hub_.events<ns::ServiceMoved>(), IsEmpty());
   come_back();
   const auto events = told();
   ASSERT_EQ(events.size(), 1u);
   EXPECT_EQ(events[0].name, "robot/odom");
-  EXPECT_EQ(events[0].old_group, first_);
-  EXPECT_EQ(events[0].new_group, present);
-  EXPECT_THAT(events[0].between, ElementsAre(between));
-  EXPECT_TRUE(events[0].again);
-  EXPECT_NE(attach().told_move, 0u);
-}
-
-TEST_F(ToldAgainTest, OfTheGroupsInBetweenTheLatestAreToldAsManyAsTheLimitSays) {
-  hub_.detach(viewer_);
-  std::vector<GroupId> between;
-  while (between.size() < ns::kGroupsBetweenMax)
-    between.push_back(advertise(6 + static_cast<std::uint32_t>(between.size())));
-  GroupId present = advertise(50);
-  come_back();
-  ASSERT_EQ(told().size(), 1u);
-  EXPECT_EQ(told()[0].old_group, first_);
-  EXPECT_EQ(told()[0].between, between);
-  EXPECT_EQ(told()[0].new_group, present);
-  hub_.detach(viewer_);
-  between.erase(between.begin());
-  between.push_back(std::exchange(present, advertise(51)));
-  come_back();
-  ASSERT_EQ(told().size(), 1u);
-  EXPECT_EQ(told()[0].old_group, first_) << "which it surely knows";
-  EXPECT_EQ(told()[0].between, between);
-  EXPECT_EQ(told()[0].new_group, present);
+  EXPECT_EQ(events[0].group, present);
+  EXPECT_EQ(events[0].provider, robot_.id);
+  EXPECT_EQ(events[0].message_type, 7u);
 }
 
 TEST_F(ToldAgainTest, WhatMayHaveBeenLostWithTheConnection) {
   const GroupId present = advertise(6);
-  const auto sent = hub_.events<ns::ServiceMoved>();
-  ASSERT_EQ(sent.size(), 1u);
-  EXPECT_FALSE(sent[0].again);
+  ASSERT_EQ(hub_.events<ns::ServiceMoved>().size(), 1u);
   hub_.detach(viewer_);
   come_back();
   ASSERT_EQ(told().size(), 1u);
-  EXPECT_EQ(told()[0].new_group, present);
+  EXPECT_EQ(told()[0].group, present);
   come_back();
-  EXPECT_EQ(told().size(), 1u) << "nor is it known that it was read on the second connection";
+  EXPECT_THAT(told(), IsEmpty()) << "nothing changed since the second connection began";
 }
 
-TEST_F(ToldAgainTest, NothingThatWasRead) {
-  advertise(6);
-  const std::uint64_t move = last_move();
-  ASSERT_NE(move, 0u);
-  read(move, viewer_.attachment);
+TEST_F(ToldAgainTest, ThatAProviderWent) {
   hub_.detach(viewer_);
+  hub_.detach(robot_, true, proto::GoodbyeCode::done);
   come_back();
-  EXPECT_THAT(told(), IsEmpty());
-  EXPECT_EQ(attach().told_move, 0u);
-}
-
-TEST_F(ToldAgainTest, WhatWasReadOnAnEarlierConnectionIsToldAgainAllTheSame) {
-  advertise(6);
-  const std::uint64_t move = last_move();
-  const std::uint32_t earlier = viewer_.attachment;
-  come_back();
-  read(move, earlier);
-  come_back();
-  EXPECT_EQ(told().size(), 1u);
-  read(attach().told_move, viewer_.attachment);
-  come_back();
-  EXPECT_THAT(told(), IsEmpty());
+  ASSERT_EQ(told().size(), 1u);
+  EXPECT_EQ(told()[0].group, first_) << "the group stays";
+  EXPECT_EQ(told()[0].provider, NodeId{});
+  EXPECT_EQ(told()[0].session, 0u);
 }
 
 TEST_F(ToldAgainTest, AlsoUnderAnotherId) {

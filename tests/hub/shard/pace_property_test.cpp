@@ -85,8 +85,7 @@ class World {
     }
   }
 
-  /// Everybody is there and credits what it got: each has its whole window, and gets the newest
-  /// message.
+  /// Everybody is there and credits: each has its whole window, and gets the newest message.
   void finish() {
     while (!pieces_.empty()) write_piece();
     for (CountingSubscriber& each : subscribers_) {
@@ -122,9 +121,7 @@ class World {
     if (seed % 3 != 1) {
       limits.lane0_bytes = limits.lane1_bytes = limits.lane2_bytes = limits.lane3_bytes = 16 * 1024;
     }
-    if (seed % 3 == 0) {
-      limits.mailbox_entries = 16;
-    }
+    if (seed % 3 == 0) limits.mailbox_entries = 16;
     return limits;
   }
   std::size_t below(std::size_t bound) { return random_() % bound; }
@@ -153,9 +150,9 @@ class World {
       for (CountingSubscriber& each : subscribers_) {
         each.known = false;
         rig_.command(each.node->shard.value(),
-                     EndPaceCommand{each.node->session, GroupId{HubRig::group(group_)}, true});
+                     EndPaceCommand{each.node->session, GroupId{HubRig::group(group_)}});
       }
-      rig_.command(0, ForgetRetainedCommand{GroupId{HubRig::group(group_)}});
+      rig_.command(0, ForgetRetainedCommand{GroupId{HubRig::group(group_)}, provider_->id});
       settle();
     }
     ++group_;
@@ -179,20 +176,32 @@ class World {
     each.known = true;
     publish_members();
     rig_.pace(*each.node, group_, each.terms, retain_);
-    // What its own shard has not handed over yet may come before the last message that this shard
-    // routed.
+    if (begins) answer(each);
+    // What its own shard has not handed over yet may come before the last routed message.
     if (begins) each.repeats_up_to = sequence_;
     if (begins && retain_ && std::exchange(each.fresh, false)) each.first_at_least = last_routed_;
     if (!each.resume && begins) rig_.turn_shard(each.node->shard.value());
   }
 
+  void answer(CountingSubscriber& each) {
+    SendControlCommand command;
+    command.session = each.node->session;
+    command.frame = HubRig::frame(*each.node, each.node->id.value(),
+                                  std::string(1, static_cast<char>(++each.number)),
+                                  {.kind = Kind::ns, .src = 7u << 20});
+    command.answers = 1;
+    command.counts = CountsBegin{GroupId{HubRig::group(group_)}, each.number};
+    rig_.command(each.node->shard.value(), std::move(command));
+  }
+
   void unsubscribe(CountingSubscriber& each) {
     if (!each.subscribed || below(3) != 0) return;
+    rig_.turn_shard(each.node->shard.value());  // it reads the last CREDIT
     each.subscribed = false;
     each.first_at_least = 0;
     publish_members();
     rig_.command(each.node->shard.value(),
-                 EndPaceCommand{each.node->session, GroupId{HubRig::group(group_)}, false});
+                 EndPaceCommand{each.node->session, GroupId{HubRig::group(group_)}});
   }
 
   // ---- the provider
@@ -204,9 +213,9 @@ class World {
 
   /// Fills the subscribers' queues, where the oldest goes.
   void make_noise() {
-    const FrameSpec spec{.kind = Kind::broadcast,
-                         .lane = static_cast<std::uint8_t>(1 + below(lanes_))};
-    rig_.send(*noise_, 0xFFFFFFFF, std::string(below(6'000), 'n'), spec);
+    const auto lane = static_cast<std::uint8_t>(1 + below(lanes_));
+    rig_.send(*noise_, 0xFFFFFFFF, std::string(below(6'000), 'n'),
+              {.kind = Kind::broadcast, .lane = lane});
     ++noise_frames_;
   }
 
@@ -292,6 +301,7 @@ class World {
       each.first_at_least = 0;
     }
     take_frames(each);
+    if (each.subscribed && each.counted != each.number) answer(each);
     // What was said on the broken connection may be lost.
     credit(each, each.credited);
     if (each.resume && connected(node))
@@ -299,9 +309,10 @@ class World {
   }
 
   void credit(CountingSubscriber& each, std::uint64_t total) {
-    if (!connected(*each.node) || !each.known) return;
+    if (!connected(*each.node) || !each.known || !each.subscribed) return;
     each.credited = std::max(each.credited, total);
-    rig_.send_flow(*each.node, proto::flow::Credit{GroupId{HubRig::group(group_)}, each.credited});
+    rig_.send_flow(*each.node, proto::flow::Credit{GroupId{HubRig::group(group_)}, each.credited,
+                                                   each.counted});
     if (each.resume) rig_.send_flow(*each.node, proto::flow::Confirm{each.node->data_frames});
   }
 
@@ -311,14 +322,24 @@ class World {
   }
 
   void take_frames(CountingSubscriber& each) {
-    for (const GotFrame& frame : each.node->frames) {
-      if (frame.header.dst == HubRig::group(group_)) each.take(frame);
+    std::size_t next = 0;
+    std::size_t next_control = 0;
+    for (const Kind kind : each.node->kinds) {
+      if (kind == Kind::ns) {
+        each.begin_counts(
+            static_cast<std::uint8_t>(each.node->control.at(next_control++).text()[0]));
+      } else if (kind != Kind::group && kind != Kind::broadcast) {
+        ++next_control;
+      } else {
+        const GotFrame& frame = each.node->frames.at(next++);
+        if (frame.header.dst == HubRig::group(group_)) each.take(frame);
+      }
     }
+    each.node->kinds.clear();
     each.node->frames.clear();
     each.node->control.clear();
   }
 
-  /// The provider and the noise get noise too.
   void read_others() {
     for (FakeNode* node : {provider_, noise_}) node->read();
     rig_.send_flow(*provider_, proto::flow::Confirm{provider_->data_frames});
@@ -346,7 +367,6 @@ class World {
         credit(each, each.ended);
       }
     }
-    // What was said last is heard.
     rig_.pass_ms(200);
   }
 
@@ -368,7 +388,6 @@ class World {
 };
 
 class Pace : public ::testing::TestWithParam<std::uint32_t> {};
-
 INSTANTIATE_TEST_SUITE_P(Seeds, Pace, ::testing::Range(0u, 60u));
 
 TEST_P(Pace, HoldsForRandomOperations) {

@@ -15,15 +15,17 @@ using test::expect_answer;
 using test::expect_request;
 
 constexpr NodeId kNode{0x00700012};
+constexpr NodeId kProvider{0x00700011};
 constexpr GroupId kGroup{0x00700005};
 
-std::vector<std::byte> proof() {
-  std::vector<std::byte> bytes;
-  for (const int each : {0x48, 0x9e, 0x85, 0xf2, 0x6b, 0x35, 0xf3, 0x25, 0x37, 0x09, 0x1b, 0xea,
-                         0x2e, 0x1f, 0x33, 0}) {
-    bytes.push_back(static_cast<std::byte>(each));
-  }
-  return bytes;
+/// 7#5 while `provider` provides it in its third session.
+ServiceState state(NodeId provider) {
+  ServiceState state;
+  state.group = kGroup;
+  state.provider = provider;
+  state.session = 3;
+  state.message_type = 3;
+  return state;
 }
 
 TEST(NsMessages, AreDecodedAndWrittenAsTheVectorsSay) {
@@ -32,19 +34,17 @@ TEST(NsMessages, AreDecodedAndWrittenAsTheVectorsSay) {
   expect_request("ns/reverse", 2, Reverse{kNode});
   expect_answer("ns/reverse_answer", 2, ReverseAnswer{"robot/base", kNode});
   expect_request("ns/list", 3, List{"robot/**", NodeId{0x00700011}, 2});
-  expect_request(
-      "ns/advertise", 4,
-      Advertise{"odom", 3, 1, Direction::provides, Delivery::latest, "x y theta", kGroup});
+  expect_request("ns/advertise", 4,
+                 Advertise{"odom", 3, 1, Direction::provides, Delivery::latest, "x y theta"});
   expect_answer("ns/advertise_answer", 4, AdvertiseAnswer{kGroup, 2});
-  Advertise again{"odom", 3, 1, Direction::provides, Delivery::latest, "", kGroup};
-  again.former_proof = proof();
-  expect_request("ns/advertise_again", 15, again);
-  expect_answer("ns/advertise_again_answer", 15, AdvertiseAnswer{kGroup, 2, proof()});
   expect_request("ns/withdraw", 5, Withdraw{kGroup});
   expect_answer("ns/withdraw_answer", 5, WithdrawAnswer{});
   expect_request("ns/services", 6, Services{});
   expect_request("ns/subscribe", 7, Subscribe{"robot/odom"});
-  expect_answer("ns/subscribe_answer", 7, SubscribeAnswer{kGroup, 3, 1, Delivery::latest});
+  SubscribeAnswer answer{state(kNode)};
+  answer.instance = 1;
+  answer.delivery = Delivery::latest;
+  expect_answer("ns/subscribe_answer", 7, answer);
   Advertise offer;
   offer.service = "map";
   offer.message_type = 3;
@@ -52,12 +52,13 @@ TEST(NsMessages, AreDecodedAndWrittenAsTheVectorsSay) {
   offer.window = 2;
   offer.retain = true;
   expect_request("ns/advertise_sync", 12, offer);
-  expect_request("ns/subscribe_paced", 13, Subscribe{"robot/map", 1, 3, 2.5});
-  SubscribeAnswer paced{kGroup, 3, 0, Delivery::sync};
+  expect_request("ns/subscribe_paced", 13, Subscribe{"robot/map", 1, 3, 2.5, 2});
+  SubscribeAnswer paced{state(kProvider), 2};
+  paced.delivery = Delivery::sync;
   paced.window = 1;
   paced.retain = true;
   expect_answer("ns/subscribe_paced_answer", 13, paced);
-  SubscribeAnswer accepting{kGroup, 3};
+  SubscribeAnswer accepting{state(kProvider)};
   accepting.direction = Direction::accepts;
   expect_answer("ns/subscribe_accepting_answer", 14, accepting);
   expect_request("ns/unsubscribe", 8, Unsubscribe{"robot/odom"});
@@ -79,46 +80,19 @@ TEST(NsMessages, ListRecordsAsTheVectorsSay) {
   expect_answer("ns/services_answer", 6, services);
 }
 
-TEST(NsMessages, AMoveTellsOfAsManyGroupsInBetweenAsTheLimitSays) {
-  ServiceMoved moved{"robot/odom", kGroup, GroupId{0x00700006}, 3};
-  for (std::uint32_t i = 0; i < kGroupsBetweenMax; ++i) moved.between.emplace_back(0x00700010 + i);
-  const auto read = decode<ServiceMoved>(encode(moved));
-  ASSERT_TRUE(read);
-  EXPECT_EQ(*read, moved);
-  moved.between.emplace_back(0x00700030u);
-  const auto refused = decode<ServiceMoved>(encode(moved));
-  ASSERT_FALSE(refused);
-  EXPECT_NE(refused.error().sentence.find("more than 6 groups in between"), std::string::npos)
-      << refused.error().sentence;
-}
-
 TEST(NsMessages, EventsAreAsTheVectorsSay) {
-  expect_request("ns/service_moved", 0,
-                 ServiceMoved{"robot/odom", kGroup, GroupId{0x00700006}, 3, 1, Delivery::latest});
-  expect_request("ns/service_moved_again", 0,
-                 ServiceMoved{"robot/odom",
-                              kGroup,
-                              GroupId{0x00700006},
-                              3,
-                              1,
-                              Delivery::latest,
-                              0,
-                              false,
-                              true,
-                              {GroupId{0x00700008}}});
-  ServiceMoved accepting{"robot/cmd", GroupId{}, GroupId{0x00700006}, 3};
+  ServiceMoved moved{state(kNode), "robot/odom"};
+  moved.instance = 1;
+  moved.delivery = Delivery::latest;
+  expect_request("ns/service_moved", 0, moved);
+  moved.provider = NodeId{};
+  moved.session = 0;
+  expect_request("ns/service_moved_nobody", 0, moved);
+  ServiceMoved accepting{state(kNode), "robot/cmd"};
+  accepting.group = GroupId{0x00700006};
   accepting.direction = Direction::accepts;
   expect_request("ns/service_moved_accepting", 0, accepting);
-  SubscriberJoined joined;
-  joined.group = kGroup;
-  joined.node = kNode;
-  joined.subscribers = 2;
-  expect_request("ns/subscriber_joined", 0, joined);
-  SubscriberLeft left;
-  left.group = kGroup;
-  left.node = kNode;
-  left.subscribers = 1;
-  expect_request("ns/subscriber_left", 0, left);
+  expect_request("ns/subscribers", 0, Subscribers{kGroup, 2});
 }
 
 TEST(NsMessages, BoundNames) {

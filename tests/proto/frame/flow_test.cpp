@@ -23,7 +23,7 @@ const std::vector<std::pair<std::string, Message>>& examples() {
   static const std::vector<std::pair<std::string, Message>> kExamples = {
       {"flow/ping", Ping{3, kNewYear}},
       {"flow/pong", Pong{3, kNewYear, kNewYear + 40'000}},
-      {"flow/credit", Credit{GroupId{0x00700005}, 40}},
+      {"flow/credit", Credit{GroupId{0x00700005}, 40, 2}},
       {"flow/pause", Pause{{Kind::unicast, Lane::bulk, 0x00700012}}},
       {"flow/resume", Resume{{Kind::unicast, Lane::bulk, 0x00700012}}},
       {"flow/confirm", Confirm{1000}},

@@ -146,9 +146,9 @@ class Stranger:
 
     # ---- section 4
 
-    def flow(self, operation, rest):
+    def flow(self, operation, rest, number=0):
         seen.add(("FLOW", operation))
-        self.write(FLOW, 0, bytes([operation, 0, 0, 0]) + rest)
+        self.write(FLOW, 0, bytes([operation, number, 0, 0]) + rest)
 
     def ping(self, sequence=1):
         sent = time.time_ns()

@@ -3,7 +3,7 @@
 import signal
 import struct
 
-from stranger_parts.bitestream import F64, OPAQUE, TEXT, U16, U8, every, fields, put
+from stranger_parts.bitestream import F64, TEXT, U16, U8, every, fields, put
 from stranger_parts.case import PATIENT, Case
 from stranger_parts.client import (CTRL, F_EXT, F_FRAGMENT, F_KEYED, F_REPORT, FLOW, LATEST, LINK, NS, Denied, Refused,
                                    u32)
@@ -36,46 +36,54 @@ class Names(Case):
         found = [fields(record) for record in every(viewer.ask(NS, 9, put(3, TEXT, "**")), 3)]
         self.assertEqual([(r[1], r[2], r[3], r[7], r[8]) for r in found],
                          [(group, "robot/scan", robot.id, 1, "360 beams")])
-        self.assertEqual(viewer.subscribe("robot/scan")[3], group)
-        joined = robot.event(33)
-        self.assertEqual((joined[3], joined[4], joined[5]), (group, viewer.id, 1))
+        self.assertEqual(viewer.subscribe("robot/scan")[4], group)
+        told = robot.event(33)
+        self.assertEqual((told[3], told[4]), (group, 1))
         viewer.ask(NS, 11, put(3, TEXT, "robot/scan"))
-        left = robot.event(34)
-        self.assertEqual((left[3], left[4], left.get(5, 0)), (group, viewer.id, 0))
+        told = robot.event(33)
+        self.assertEqual((told[3], told[4]), (group, 0))
         robot.ask(NS, 8, u32(3, group))
 
-    def test_a_service_has_its_group_again_after_its_hub_was_killed_if_it_proves_it(self):
+    def test_a_service_has_another_group_after_its_hub_was_killed(self):
         hub = self.hub(*PATIENT)
-        robot, other = self.stranger(hub, "robot"), self.stranger(hub, "other")
-        before, others = robot.advertise("scan"), other.advertise("scan")
-        self.assertEqual((len(before[5]), len(others[5])), (16, 16))
+        robot = self.stranger(hub, "robot")
+        before = robot.advertise("scan")[3]
         hub.process.signal(signal.SIGKILL)
         hub.process.wait()
         hub = hub.again(self)
-        other = self.stranger(hub, "other", token=other.welcome[2])
-        former = u32(9, before[3])
-        for service, proof in (("a", b""), ("b", put(12, OPAQUE, before[5])), ("scan", put(12, OPAQUE, others[5]))):
-            self.assertNotIn(other.advertise(service, former=former, proof=proof)[3], (before[3], others[3]))
+        other = self.stranger(hub, "other")
         robot = self.stranger(hub, "robot", token=robot.welcome[2])
-        after = robot.advertise("scan", former=former, proof=put(12, OPAQUE, before[5]))
-        self.assertEqual((after[3], after[5]), (before[3], before[5]))
-        with self.assertRaises(Denied) as denied:
-            robot.advertise("odom", former=former, proof=put(12, OPAQUE, bytes(65)))
-        self.assertEqual(denied.exception.args[0], 2)
+        groups = [who.advertise(service)[3] for who, service in ((other, "a"), (robot, "scan"), (other, "b"))]
+        self.assertEqual(len({before, *groups}), 4, "each id once")
+        self.assertEqual(other.subscribe("robot/scan")[4], groups[1])
+
+    def test_a_service_keeps_its_group_while_others_provide_it(self):
+        hub = self.hub()
+        robot, viewer = self.stranger(hub, "robot"), self.stranger(hub)
+        group = robot.advertise("scan")[3]
+        first = viewer.subscribe("robot/scan")
+        self.assertEqual((first[4], first[5]), (group, robot.id))
+        robot.ask(NS, 8, u32(3, group))
+        moved = viewer.event(32)
+        self.assertEqual((moved[4], moved.get(5, 0)), (group, 0), "nobody provides it")
+        self.assertEqual(robot.advertise("scan")[3], group)
+        moved = viewer.event(32)
+        self.assertEqual((moved[4], moved[5], moved[6]), (group, robot.id, first[6]))
+        self.assertNotEqual(robot.advertise("scan", type=u32(4, 8))[3], group, "other terms")
 
     def test_a_subscriber_is_told_that_a_service_takes_data(self):
         hub = self.hub()
         viewer, robot = self.stranger(hub), self.stranger(hub, "robot")
-        self.assertEqual(viewer.subscribe("robot/drive")[3], 0)
+        self.assertEqual(viewer.subscribe("robot/drive").get(4, 0), 0)
         group = robot.advertise("drive", direction=put(6, U8, 1))[3]
         moved = viewer.event(32)
-        self.assertEqual((moved[5], moved[13]), (group, 1))
+        self.assertEqual((moved[4], moved[12]), (group, 1))
         answer = viewer.subscribe("robot/drive")
-        self.assertEqual((answer[3], answer[10]), (group, 1))
+        self.assertEqual((answer[4], answer[12]), (group, 1))
         group = robot.advertise("drive", direction=put(6, U8, 0))[3]
         moved = viewer.event(32)
-        self.assertEqual((moved[5], moved.get(13, 0)), (group, 0))
-        self.assertNotIn(10, viewer.subscribe("robot/drive"))
+        self.assertEqual((moved[4], moved.get(12, 0)), (group, 0))
+        self.assertNotIn(12, viewer.subscribe("robot/drive"))
 
     def test_refusals(self):
         hub = self.hub()
@@ -115,9 +123,9 @@ class Names(Case):
         robot, viewer = self.stranger(hub, "robot"), self.stranger(hub)
         for window, answered in ((0, 1), (1_024, 1_024)):
             robot.advertise("map", delivery=put(7, U8, 2), window=u32(10, window))
-            self.assertEqual(viewer.subscribe("robot/map")[8], answered)
+            self.assertEqual(viewer.subscribe("robot/map")[10], answered)
         for terms in (u32(4, 0), put(6, F64, 0.0), put(6, F64, 0.001), put(6, F64, 1_000.0), u32(5, 64)):
-            self.assertEqual(viewer.subscribe("robot/map", terms)[8], 1_024)
+            self.assertEqual(viewer.subscribe("robot/map", terms)[10], 1_024)
         for terms in (u32(4, 1_025), u32(5, 0), u32(5, 65), put(6, F64, 0.0009), put(6, F64, 1_001.0), put(6, F64, -1.0)):
             with self.assertRaises(Denied) as denied:
                 viewer.subscribe("robot/map", terms)

@@ -31,10 +31,10 @@ class Data(Case):
     def test_group_and_service(self):
         hub = self.hub()
         provider, subscriber = self.stranger(hub, "robot"), self.stranger(hub)
-        self.assertEqual(subscriber.subscribe("robot/odom")[3], 0, "there is no such service yet")
+        self.assertEqual(subscriber.subscribe("robot/odom").get(4, 0), 0, "there is no such service yet")
         group = provider.advertise("odom", type=u32(4, 17), instance=u32(5, 3))[3]
         moved = subscriber.event(32)
-        self.assertEqual((moved[3], moved[5], moved[6], moved[7]), ("robot/odom", group, 17, 3))
+        self.assertEqual((moved[3], moved[4], moved[5], moved[7], moved[8]), ("robot/odom", group, provider.id, 17, 3))
         provider.write(GROUP, group, b"pose")
         self.assertEqual(subscriber.data(GROUP).body, b"pose")
         commands = provider.advertise("drive", direction=put(6, U8, 1))[3]
@@ -49,13 +49,13 @@ class Data(Case):
         hub = self.hub()
         robot, viewer = self.stranger(hub, "robot"), self.stranger(hub)
         group = robot.advertise("map", delivery=put(7, U8, 2), window=u32(10, 2), retain=put(11, BOOL, True))[3]
-        answer = viewer.subscribe("robot/map", u32(5, 1))
-        self.assertEqual((answer[7], answer[8], answer[9]), (2, 2, True))
+        answer = viewer.subscribe("robot/map", u32(5, 1) + put(7, U8, 5))
+        self.assertEqual((answer[3], answer[9], answer[10], answer[11]), (5, 2, 2, True))
         for number in range(9):
             robot.write(GROUP, group, bytes([number]))
         robot.ping()
         self.assertEqual([viewer.data(GROUP).body for _ in range(2)], [b"\0", b"\1"])
-        viewer.flow(wire.CREDIT, struct.pack("<IQ", group, 2))
+        viewer.flow(wire.CREDIT, struct.pack("<IQ", group, 2), number=5)
         self.assertEqual(viewer.data(GROUP).body, b"\x08", "the newest of those that waited")
         late = self.stranger(hub)
         late.subscribe("robot/map")

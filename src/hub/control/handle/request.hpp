@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -14,6 +15,7 @@
 #include "hub/observe/refusal_counters.hpp"
 #include "hub/observe/request_counters.hpp"
 #include "hub/observe/session_gauges.hpp"
+#include "hub/shard/commands.hpp"
 #include "proto/control/control_message.hpp"
 
 namespace gimnet::hub {
@@ -44,6 +46,7 @@ struct HandlerContext {
   const RefusalCounters* refusals = nullptr;         ///< or none
   const RequestCounters* requests = nullptr;         ///< or none
   Administration* administration = nullptr;          ///< or none
+  std::optional<CountsBegin> counts{};               ///< what begins with the answer
 };
 
 /// A request of kind NS or CTRL. Valid until: the handler returns.

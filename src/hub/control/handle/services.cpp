@@ -56,6 +56,7 @@ Result<SubscriberTerms, proto::Refusal> terms_of(const Limits& limits, const ns:
   SubscriberTerms terms;
   terms.window = wanted.window;
   terms.depth = wanted.depth;
+  terms.number = wanted.number;
   if (wanted.window > limits.sync_window && !(standing && standing->window == terms.window)) {
     return out_of_range("the window of a subscription",
                         "1 to " + std::to_string(limits.sync_window), "sync_window");
@@ -108,13 +109,10 @@ Result<ns::AdvertiseAnswer, proto::Refusal> advertise(HandlerContext& context,
   if (standing == nullptr || *standing != terms) {
     if (auto refusal = count_declaration(context, session)) return *refusal;
   }
-  const Services::FormerGroup former{
-      own_index(context.facts, offer.former_group).value_or(kNoGroup), offer.former_proof};
   const auto done = context.membership.services().advertise(session.index, full_name, terms,
-                                                            context.now, context.effects, former);
+                                                            context.now, context.effects);
   if (!done) return done.error();
-  return ns::AdvertiseAnswer{
-      group_id(context, done->group), done->subscribers, {done->proof.begin(), done->proof.end()}};
+  return ns::AdvertiseAnswer{group_id(context, done->group), done->subscribers};
 }
 
 Result<ns::ServicesAnswer, proto::Refusal> services(const HandlerContext& context,
@@ -179,23 +177,21 @@ proto::Payload handle_subscribe(HandlerContext& context, const Request& request)
             context.membership.services().subscribed(request.session.index, wanted.name);
         const auto terms = terms_of(context.limits, wanted, standing);
         if (!terms) return terms.error();
-        if (standing != *terms) {
+        SubscriberTerms repeated = standing.value_or(SubscriberTerms{});
+        repeated.number = terms->number;
+        if (!standing || repeated != *terms) {
           if (auto refusal = count_declaration(context, request.session)) return *refusal;
         }
         const auto topic = context.membership.services().subscribe(
             request.session.index, wanted.name, *terms, context.effects);
         if (!topic) return topic.error();
         ns::SubscribeAnswer answer;
-        if (const std::optional<Service>& service = (*topic)->service) {
-          answer.group = group_id(context, service->group);
-          answer.message_type = service->terms.message_type;
-          answer.instance = service->terms.instance;
-          answer.delivery = service->terms.delivery;
-          answer.retain = service->terms.retain;
-          answer.direction = service->terms.direction;
-          if (const auto pace = (*topic)->pace_of(request.session.index))
-            answer.window = pace->window;
-        }
+        put_state(answer, HubTitle{context.facts.id, context.facts.name}, **topic,
+                  context.membership);
+        answer.window = (*topic)->window_of(request.session.index);
+        answer.number = terms->number;
+        if (answer.window != 0 && (!standing || standing->number != terms->number))
+          context.counts = CountsBegin{answer.group, terms->number};
         return answer;
       });
 }
@@ -204,7 +200,7 @@ proto::Payload handle_unsubscribe(HandlerContext& context, const Request& reques
   return answer_to<ns::Unsubscribe>(
       request, [&](const ns::Unsubscribe& wanted) -> Result<ns::UnsubscribeAnswer, proto::Refusal> {
         const std::optional<proto::Refusal> failed = context.membership.services().unsubscribe(
-            request.session.index, wanted.name, context.effects);
+            request.session.index, wanted.name, context.now, context.effects);
         if (failed) return *failed;
         return ns::UnsubscribeAnswer{};
       });

@@ -23,6 +23,10 @@ struct NodeChanged {
 struct GroupChanged {
   GroupIndex index;
 };
+/// Publish who provides this group now.
+struct ProviderChanged {
+  GroupIndex index;
+};
 /// Publish whether and how that node is a member of this group.
 struct MemberChanged {
   GroupIndex group;
@@ -47,28 +51,16 @@ struct RenumberDue {
   NodeIndex index;
   std::string sentence;
 };
-/// Tell subscribers that a service has another group id: all those that have the same window.
-struct ServiceMovedDue {
-  std::vector<NodeIndex> subscribers;
+/// Tell a service's subscribers what it is now.
+struct ServiceMoved {
   std::string full_name;
-  GroupIndex old_group;  ///< or kNoGroup
-  GroupIndex new_group;  ///< or kNoGroup
-  std::uint32_t message_type = 0;
-  std::uint32_t instance = 0;
-  proto::ns::Delivery delivery = proto::ns::Delivery::stream;
-  std::uint32_t window = 0;
-  bool retain = false;
-  proto::ns::Direction direction = proto::ns::Direction::provides;
-  std::uint64_t move = 0;  ///< numbers the moves of a hub's services: that one and those before it
-  // Told once more, to a node that came back
-  bool again = false;
-  std::vector<GroupIndex> between;  ///< groups that the service had since `old_group`, in order
 };
-/// What a subscriber asked for. 0: not.
+/// What a subscriber asked for. 0: not. `number`: of its counts (docs/protocol.md, section 8).
 struct SubscriberTerms {
   std::uint32_t window = 0;
   std::uint32_t depth = 1;
   std::uint32_t interval_us = 0;
+  std::uint8_t number = 0;
   friend bool operator==(const SubscriberTerms&, const SubscriberTerms&) = default;
 };
 /// Have the subscriber's shard pace what it gets of a group: after the group was published. `terms`
@@ -80,24 +72,20 @@ struct PaceDue {
   bool retained = false;   ///< it begins with the last message
   bool was_plain = false;  ///< it got everything before, in this group
 };
-/// A subscription that was paced ended; `group_gone`: so did the group.
+/// A subscription that was paced ended.
 struct PaceEnded {
   NodeIndex subscriber;
   GroupIndex group;
-  bool group_gone = false;
 };
-/// A retained group is gone: its last message is kept no longer.
+/// That node provides the retained group no more: its last message is kept no longer. After the
+/// table has said so.
 struct RetainedDropped {
   NodeIndex provider;
   GroupIndex group;
 };
-/// Tell a provider that somebody came or went.
-struct SubscriberDue {
-  NodeIndex provider;
-  GroupIndex group;
-  NodeIndex subscriber;
-  std::uint32_t subscribers_now = 0;
-  bool joined = false;
+/// Tell a service's provider how many subscribers there are now.
+struct SubscribersChanged {
+  std::string full_name;
 };
 /// Keep what Membership::durable() says where it outlives the hub, then call state_kept().
 struct StateDue {};
@@ -126,9 +114,9 @@ struct ServiceNoted {
   std::string full_name;
 };
 
-using Effect = std::variant<NodeChanged, GroupChanged, MemberChanged, SessionEnded, ServiceMovedDue,
-                            PaceDue, PaceEnded, RetainedDropped, SubscriberDue, CloseDue,
-                            RenumberDue, StateDue, NameDecided, NodeNoted, ServiceNoted>;
+using Effect = std::variant<NodeChanged, GroupChanged, ProviderChanged, MemberChanged, SessionEnded,
+                            ServiceMoved, PaceDue, PaceEnded, RetainedDropped, SubscribersChanged,
+                            CloseDue, RenumberDue, StateDue, NameDecided, NodeNoted, ServiceNoted>;
 using Effects = std::vector<Effect>;
 
 }  // namespace gimnet::hub

@@ -24,17 +24,14 @@ struct HubState {
   std::uint32_t node_mark = 1;            ///< the next start hands out node indices from here
   std::uint32_t group_mark = 1;           ///< the same for groups
   IndexSet nodes_used;                    ///< node indices that the next start must not hand out
-  IndexSet groups_used;                   ///< the same for groups
-  std::uint64_t group_forgettings = 0;    ///< how often used groups were forgotten
-  IndexSet groups_outlasting;        ///< those that were in use the last time; all of them are used
-  std::vector<SessionToken> kicked;  ///< not honoured any more
+  std::vector<SessionToken> kicked;       ///< not honoured any more
   friend bool operator==(const HubState&, const HubState&) = default;
 };
 
 inline constexpr std::size_t kKickedMax = 65'536;
 /// The longest legal file.
 inline constexpr std::size_t kHubStateBytesMax =
-    104 + kKickedMax * 24 + 3 * IndexSet::bytes_max(kIndexMost) + 32;
+    88 + kKickedMax * 24 + IndexSet::bytes_max(kIndexMost) + 32;
 
 [[nodiscard]] std::vector<std::byte> write_hub_state(const HubState& state);
 /// The file is not trusted: whatever it holds is read as written above or refused. Errors: what is
@@ -47,9 +44,9 @@ struct HubStart {
   IndexRange nodes{};
   IndexRange groups{};
 };
-/// How the hub goes on from what it found: the next boot number, unused indices from the marks on,
-/// all of them kept as used, without the kicked ones whose tokens have expired by `wall` (since
-/// 1970). Errors: the boot number is at its end.
+/// How the hub goes on from what it found: the next boot number, unused node indices from the mark
+/// on, all of them kept as used, the next block of group indices, without the kicked ones whose
+/// tokens have expired by `wall` (since 1970). Errors: the boot number is at its end.
 [[nodiscard]] Result<HubStart> next_start(const HubState& found, std::chrono::milliseconds wall);
 
 }  // namespace gimnet::hub

@@ -22,9 +22,7 @@ IndexPool::IndexPool(std::uint32_t most, std::chrono::milliseconds resting_time,
       keeps_nothing_(range.count == IndexRange::kAll),
       returns_until_(returns_until),
       end_(std::min<std::uint64_t>(range.count, most)),
-      used_(range.used),
-      forgettings_(range.forgettings),
-      outlasting_(range.outlasting) {
+      used_(range.used) {
   GIMNET_CHECK(first_ > 0 && first_ <= most_);
   for (std::uint64_t position = 0; position < end_; ++position)
     granted_left_ += used(index_at(position)) ? 0 : 1;
@@ -102,8 +100,6 @@ IndexPool::Grant IndexPool::next_grant(std::chrono::milliseconds now) const {
   Grant next;
   next.forgets_gone = forgetting_due(now);
   next.used = next.forgets_gone ? taken_ : used_;
-  next.forgettings = forgettings_ + (next.forgets_gone ? 1 : 0);
-  next.outlasting = next.forgets_gone ? taken_ : outlasting_;
   next.count = position_;
   std::uint64_t left = 0;
   // What was granted stays so. Beyond it no further than to the last one that is not used: the
@@ -126,8 +122,7 @@ IndexPool::Grant IndexPool::next_grant(std::chrono::milliseconds now) const {
 
 void IndexPool::grant(const Grant& grant) {
   GIMNET_CHECK(grant.count >= position_ && grant.count <= position_ + most_);
-  if (grant.forgets_gone) used_ = outlasting_ = taken_;
-  forgettings_ = grant.forgettings;
+  if (grant.forgets_gone) used_ = taken_;
   end_ = grant.count;
   granted_left_ = 0;
   for (std::uint64_t position = position_; position < end_; ++position)

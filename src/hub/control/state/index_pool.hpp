@@ -16,8 +16,6 @@ struct IndexRange {
   std::uint32_t first = 1;
   std::uint64_t count = kAll;
   IndexSet used{};
-  std::uint64_t forgettings = 0;  ///< how often used ones were forgotten so far
-  IndexSet outlasting{};          ///< those that were in use the last time
   /// Of a pool of which nothing outlives the hub.
   static constexpr std::uint64_t kAll = std::uint64_t{1} << 62;
 };
@@ -29,9 +27,9 @@ struct IndexRange {
 /// What a newcomer may get outlives the hub before anybody gets it: some indices are granted ahead,
 /// and kept as used. A later start that goes on from what was kept gives newcomers none that
 /// anybody may have. Used indices that nobody has any more are forgotten when few others are left,
-/// but never while nodes of before a restart may still come back. Between two forgettings no index
-/// is handed out twice. Thread safety: none. Limits: `most` indices; two bits each. It serves nodes
-/// and groups alike: its indices get their type (NodeIndex, GroupIndex) where they leave it.
+/// but never while nodes of before a restart may still come back. Thread safety: none. Limits:
+/// `most` indices; two bits each. It serves nodes and groups alike: its indices get their type
+/// (NodeIndex, GroupIndex) where they leave it.
 class IndexPool {
  public:
   /// What is granted at a time.
@@ -64,13 +62,6 @@ class IndexPool {
   /// Are there used ones that were not kept as used yet? A start that goes on from what was kept
   /// could hand them out.
   [[nodiscard]] bool unkept() const { return unkept_ && !keeps_nothing_; }
-  /// How often used indices were forgotten, over all starts.
-  [[nodiscard]] std::uint64_t forgettings() const { return forgettings_; }
-  /// Was it in use the last time that others were forgotten? Who got it between the time before and
-  /// then, or had it already, is the last that got it.
-  [[nodiscard]] bool outlasted_forgetting(std::uint32_t index) const {
-    return outlasting_.contains(index);
-  }
   /// How long newcomers have to wait for those of before a restart, since all indices are used;
   /// nothing: it is not that.
   [[nodiscard]] std::optional<std::chrono::milliseconds> waits_for_returns(
@@ -86,8 +77,6 @@ class IndexPool {
     std::uint64_t count = 0;  ///< how many indices may be looked at from the pool's first on
     bool forgets_gone =
         false;  ///< used indices that nobody holds and that do not rest may be handed out anew
-    std::uint64_t forgettings = 0;  ///< this one included
-    IndexSet outlasting{};          ///< what was in use at the last one
   };
   /// Is there reason to keep next_grant()? Less than half a block of what was granted is left, or
   /// somebody has an index that was not kept as used, or used ones are due to be forgotten; and it
@@ -123,11 +112,9 @@ class IndexPool {
   std::uint32_t granted_left_ = 0;  ///< of those, how many are not used
   IndexSet taken_;                  ///< held or resting
   IndexSet used_;                   ///< the same, and what was or may have been
-  std::uint64_t forgettings_;
-  IndexSet outlasting_;          ///< in use at the last one of these
-  bool keeping_failed_ = false;  ///< the last time that it was tried
-  bool unkept_ = false;          ///< something used was neither granted nor kept as used
-  DueList<Resting> resting_;     ///< void: those that were taken back
+  bool keeping_failed_ = false;     ///< the last time that it was tried
+  bool unkept_ = false;             ///< something used was neither granted nor kept as used
+  DueList<Resting> resting_;        ///< void: those that were taken back
   std::unordered_map<std::uint32_t, std::chrono::milliseconds> rests_until_;
   std::uint32_t held_ = 0;
 };

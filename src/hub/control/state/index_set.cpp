@@ -18,14 +18,6 @@ void IndexSet::erase(std::uint32_t index) {
   --size_;
 }
 
-bool IndexSet::is_within(const IndexSet& other) const {
-  for (std::size_t i = 0; i < bytes_.size(); ++i) {
-    const std::byte theirs = i < other.bytes_.size() ? other.bytes_[i] : std::byte{0};
-    if ((bytes_[i] & ~theirs) != std::byte{0}) return false;
-  }
-  return true;
-}
-
 std::span<const std::byte> IndexSet::bytes() const {
   std::size_t size = bytes_.size();
   while (size > 0 && bytes_[size - 1] == std::byte{0}) --size;

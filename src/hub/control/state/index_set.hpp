@@ -19,9 +19,6 @@ class IndexSet {
   void erase(std::uint32_t index);
   [[nodiscard]] std::uint32_t size() const { return size_; }
 
-  /// Is each of these in `other`, too?
-  [[nodiscard]] bool is_within(const IndexSet& other) const;
-
   /// Index i is bit i % 8 of byte i / 8, and the last byte is not 0. Valid until: the set changes.
   [[nodiscard]] std::span<const std::byte> bytes() const;
   /// What bytes() gave, of indices from 1 to `most`; nothing for any other bytes.

@@ -87,7 +87,7 @@ std::optional<Listed<NodeIndex>> list_few_nodes(const Membership& membership,
 std::optional<Listed<GroupIndex>> list_few_services(const Services& services,
                                                     const ListingRequest<GroupIndex>& request) {
   return list_by_name(services.by_name(), request, [](const Topic& topic) {
-    return topic.service ? topic.service->group : kNoGroup;
+    return topic.provided() ? topic.service->group : kNoGroup;
   });
 }
 
@@ -105,6 +105,7 @@ Listed<GroupIndex> list_services(const Services& services,
                                  const ListingRequest<GroupIndex>& request) {
   if (const auto few = list_few_services(services, request)) return *few;
   return list_by_id(services.groups(), request, [&](const Topic* topic) {
+    if (!topic->provided()) return false;
     return request.pattern == nullptr || request.pattern->matches(topic->full_name);
   });
 }

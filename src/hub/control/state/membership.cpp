@@ -27,10 +27,7 @@ Places places_for(const JoinRequest& request) {
 }  // namespace
 
 Membership::Membership(const Sessions::Options& options, const Limits& limits)
-    : limits_(limits),
-      sessions_(options, limits),
-      services_(options.hub, limits, options.groups,
-                options.returns_until.value_or(milliseconds{0}), options.secret) {}
+    : limits_(limits), sessions_(options, limits), services_(options.hub, limits, options.groups) {}
 
 Result<Membership::Joined, proto::Goodbye> Membership::join(const JoinRequest& request,
                                                             milliseconds now, Effects& effects) {
@@ -258,8 +255,8 @@ std::string Membership::why_taken(NodeId node, milliseconds now) const {
 void Membership::stood_still(milliseconds time, milliseconds now) {
   const milliseconds latest = now + milliseconds{limits_.grace_ms};
   sessions_.stood_still(time, now);
-  services_.group_indices().put_off_returns(time, latest);
   redeclaring_.put_off(time, latest);
+  services_.put_off(time, latest);
 }
 
 void Membership::tick(milliseconds now, Effects& effects) {
@@ -269,6 +266,7 @@ void Membership::tick(milliseconds now, Effects& effects) {
     redeclaring_.pop_front();
     if (still_redeclares(due)) services_.drop_undeclared(due.index, now, effects);
   }
+  services_.tick(now, effects);
 }
 
 bool Membership::still_redeclares(const Redeclaring& due) const {
@@ -279,8 +277,10 @@ bool Membership::still_redeclares(const Redeclaring& due) const {
 
 std::optional<milliseconds> Membership::next_deadline() const {
   std::optional<milliseconds> deadline = sessions_.next_expiry();
-  if (!redeclaring_.empty() && (!deadline || redeclaring_.front().until < *deadline)) {
-    deadline = redeclaring_.front().until;
+  const std::optional<milliseconds> redeclaring =
+      redeclaring_.empty() ? std::nullopt : std::optional{redeclaring_.front().until};
+  for (const std::optional<milliseconds>& other : {redeclaring, services_.next_deadline()}) {
+    if (other && (!deadline || *other < *deadline)) deadline = other;
   }
   return deadline;
 }

@@ -19,6 +19,23 @@ ns::NodeRecord record_of(const HubTitle& hub, const Session& session, const Serv
   return record;
 }
 
+void put_state(ns::ServiceState& state, const HubTitle& hub, const Topic& topic,
+               const Membership& membership) {
+  if (!topic.service) return;
+  const Service& service = *topic.service;
+  const Session* provider = membership.sessions().find(service.provider);
+  state.group = make_id(hub.id, service.group);
+  if (provider != nullptr) {
+    state.provider = make_id(hub.id, service.provider);
+    state.session = provider->number;
+  }
+  state.message_type = service.terms.message_type;
+  state.instance = service.terms.instance;
+  state.delivery = service.terms.delivery;
+  state.retain = service.terms.retain;
+  state.direction = service.terms.direction;
+}
+
 ns::ServiceRecord record_of(const HubTitle& hub, const Topic& topic) {
   const Service& service = *topic.service;
   ns::ServiceRecord record;

@@ -19,7 +19,10 @@ struct HubTitle {
 [[nodiscard]] proto::ns::NodeRecord record_of(const HubTitle& hub, const Session& session,
                                               const Services& services,
                                               std::chrono::milliseconds now);
-/// REQUIRES: the topic has a service.
+/// Writes what subscribers are told of a service, but for the window in force for one of them.
+void put_state(proto::ns::ServiceState& state, const HubTitle& hub, const Topic& topic,
+               const Membership& membership);
+/// REQUIRES: the topic is provided.
 [[nodiscard]] proto::ns::ServiceRecord record_of(const HubTitle& hub, const Topic& topic);
 
 }  // namespace gimnet::hub

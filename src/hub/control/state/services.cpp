@@ -58,48 +58,17 @@ std::optional<SubscriberTerms> Topic::pace_of(NodeIndex subscriber) const {
   return pace;
 }
 
-Services::Services(HubId hub, const Limits& limits, const IndexRange& groups,
-                   milliseconds returns_until, const Secret& secret)
-    : hub_(hub),
-      limits_(limits),
-      secret_(secret),
-      group_indices_(kIndexMost, resting_time(limits), groups, returns_until) {}
-
-GroupGrant Services::grant_of(GroupIndex group, std::string_view full_name) const {
-  return {hub_, group, full_name, group_indices_.forgettings()};
-}
-
-/// Between two forgettings one service at most is given a group anew, so that of the proofs of one
-/// such time all are right. One from the time before is right where the group was in use at the
-/// forgetting: then nobody got it since. Any other one loses: another service may have got the
-/// group.
-bool Services::is_proven(const FormerGroup& former, std::string_view full_name) const {
-  GroupGrant grant = grant_of(former.group, full_name);
-  if (proves(former.proof, grant, secret_)) return true;
-  if (grant.forgettings == 0 || !group_indices_.outlasted_forgetting(former.group.value()))
-    return false;
-  --grant.forgettings;
-  return proves(former.proof, grant, secret_);
-}
-
-std::optional<GroupIndex> Services::take_group(const FormerGroup& former,
-                                               std::string_view full_name, milliseconds now) {
-  if (former.group != kNoGroup && is_proven(former, full_name) &&
-      group_indices_.take_free(former.group.value(), now)) {
-    return former.group;
-  }
-  const std::optional<std::uint32_t> index = group_indices_.take(now);
-  return index ? std::optional{GroupIndex{*index}} : std::nullopt;
-}
+Services::Services(HubId hub, const Limits& limits, const IndexRange& groups)
+    : hub_(hub), limits_(limits), group_indices_(kIndexMost, resting_time(limits), groups) {}
 
 Result<Services::Advertised, proto::Refusal> Services::advertise(NodeIndex provider,
                                                                  std::string_view full_name,
                                                                  const ServiceTerms& terms,
-                                                                 milliseconds now, Effects& effects,
-                                                                 const FormerGroup& former) {
+                                                                 milliseconds now,
+                                                                 Effects& effects) {
   if (const char* fault = proto::name_fault(full_name)) return bad_name(fault);
   const auto known = topics_.find(full_name);
-  const bool provided = known != topics_.end() && known->second.service.has_value();
+  const bool provided = known != topics_.end() && known->second.provided();
   if (provided && known->second.service->provider != provider) {
     return proto::Refusal{Status::taken,
                           "the service '" + std::string{full_name} + "' is provided by node " +
@@ -111,40 +80,31 @@ Result<Services::Advertised, proto::Refusal> Services::advertise(NodeIndex provi
     forget_if_idle(provider);
     return limit_reached("services", limits_.services_per_node, "services_per_node");
   }
-  Topic& entry = topic(full_name);
-  if (provided) find_topic(node.provides, entry)->life = node.life;
-  if (!provided || !same_stream(entry.service->terms, terms)) {
-    const std::optional<GroupIndex> group =
-        take_group(provided ? FormerGroup{} : former, full_name, now);
-    if (group_indices_.keeping_due(now)) effects.emplace_back(StateDue{});
-    if (!group) {
-      forget_if_unused(entry);
-      forget_if_idle(provider);
-      return proto::Refusal{Status::limit, shortage("group ids", group_indices_, now)};
-    }
-    if (!provided) node.provides.push_back({&entry, node.life});
-    GroupIndex old_group;
-    if (provided) {
-      old_group = entry.service->group;
-      groups_.erase(old_group);
-      group_indices_.give_back(old_group.value(), now);
-      end_group(entry, effects);
-    }
-    open_group(entry, Service{*group, provider, terms}, old_group, effects);
+  if (provided) find_topic(node.provides, known->second)->life = node.life;
+  const bool keeps_group = known != topics_.end() && known->second.service &&
+                           same_stream(known->second.service->terms, terms);
+  std::optional<GroupIndex> group;
+  if (!keeps_group && !(group = take_group(now, effects))) {
+    forget_if_idle(provider);
+    return proto::Refusal{Status::limit, shortage("group ids", group_indices_, now)};
   }
-  if (entry.service->terms.metadata != terms.metadata) {
+  Topic& entry = topic(full_name);  // not before: a topic may have gone for its group
+  if (group) {
+    enter_group(entry, Service{*group, provider, terms}, now, effects);
+  } else if (!provided) {
+    take_over(entry, provider, terms, effects);
+  } else if (entry.service->terms.metadata != terms.metadata) {
     entry.service->terms.metadata = terms.metadata;
     effects.emplace_back(service_noted(ChangeKind::changed, entry));
   }
-  const GroupIndex group = entry.service->group;
-  return Advertised{group, static_cast<std::uint32_t>(entry.subscribers.size()),
-                    write_group_proof(grant_of(group, full_name), secret_)};
+  if (!provided) node.provides.push_back({&entry, node.life});
+  return Advertised{entry.service->group, static_cast<std::uint32_t>(entry.subscribers.size())};
 }
 
 std::optional<proto::Refusal> Services::withdraw(NodeIndex provider, GroupIndex group,
                                                  milliseconds now, Effects& effects) {
   const auto found = groups_.find(group);
-  if (found == groups_.end()) {
+  if (found == groups_.end() || !found->second->provided()) {
     return proto::Refusal{Status::not_found,
                           "no service has the group " + to_string(make_id(hub_, group))};
   }
@@ -155,8 +115,7 @@ std::optional<proto::Refusal> Services::withdraw(NodeIndex provider, GroupIndex 
   }
   Node& node = nodes_[provider];
   node.provides.erase(find_topic(node.provides, entry));
-  close_group(entry, now, effects);
-  forget_if_unused(entry);
+  end_provision(entry, now, effects);
   forget_if_idle(provider);
   return std::nullopt;
 }
@@ -185,23 +144,24 @@ Result<const Topic*, proto::Refusal> Services::subscribe(NodeIndex node_index,
   list.insert(std::lower_bound(list.begin(), list.end(), node_index), node_index);
   if (terms != SubscriberTerms{}) entry.terms[node_index] = terms;
   if (entry.service) {
+    entry.unused = 0;
     effects.emplace_back(MemberChanged{entry.service->group, node_index});
     begin_pace(entry, node_index, effects);
-    effects.emplace_back(SubscriberDue{entry.service->provider, entry.service->group, node_index,
-                                       static_cast<std::uint32_t>(list.size()), true});
+    effects.emplace_back(SubscribersChanged{std::string{full_name}});
   }
   return &entry;
 }
 
 std::optional<proto::Refusal> Services::unsubscribe(NodeIndex node_index,
-                                                    std::string_view full_name, Effects& effects) {
+                                                    std::string_view full_name, milliseconds now,
+                                                    Effects& effects) {
   const auto known = topics_.find(full_name);
   const auto node = nodes_.find(node_index);
   if (known != topics_.end() && node != nodes_.end()) {
     auto& list = node->second.subscribes;
     if (const auto declared = find_topic(list, known->second); declared != list.end()) {
       list.erase(declared);
-      remove_subscriber(known->second, node_index, effects);
+      remove_subscriber(known->second, node_index, now, effects);
       forget_if_idle(node_index);
       return std::nullopt;
     }
@@ -229,11 +189,8 @@ void Services::drop_undeclared(NodeIndex node_index, milliseconds now, Effects& 
   const std::vector<Declared> unsubscribed = take_undeclared(node.subscribes, node.life);
   const std::vector<Declared> closed = take_undeclared(node.provides, node.life);
   for (const Declared& declared : unsubscribed)
-    remove_subscriber(*declared.topic, node_index, effects);
-  for (const Declared& declared : closed) {
-    close_group(*declared.topic, now, effects);
-    forget_if_unused(*declared.topic);
-  }
+    remove_subscriber(*declared.topic, node_index, now, effects);
+  for (const Declared& declared : closed) end_provision(*declared.topic, now, effects);
   forget_if_idle(node_index);
 }
 
@@ -242,10 +199,7 @@ void Services::node_renamed(NodeIndex node_index, milliseconds now, Effects& eff
   if (found == nodes_.end()) return;
   const std::vector<Declared> provides = std::move(found->second.provides);
   found->second.provides.clear();
-  for (const Declared& declared : provides) {
-    close_group(*declared.topic, now, effects);
-    forget_if_unused(*declared.topic);
-  }
+  for (const Declared& declared : provides) end_provision(*declared.topic, now, effects);
   forget_if_idle(node_index);
 }
 
@@ -256,7 +210,8 @@ void Services::node_renumbered(NodeIndex node_index, NodeIndex new_index, Effect
   const Node& moved = nodes_.insert(std::move(node)).position->second;
   for (const Declared& declared : moved.provides) {
     declared.topic->service->provider = new_index;
-    effects.emplace_back(GroupChanged{declared.topic->service->group});
+    effects.emplace_back(ProviderChanged{declared.topic->service->group});
+    tell_subscribers(*declared.topic, effects);
     effects.emplace_back(service_noted(ChangeKind::changed, *declared.topic));
   }
   for (const Declared& declared : moved.subscribes) {
@@ -270,15 +225,6 @@ void Services::node_renumbered(NodeIndex node_index, NodeIndex new_index, Effect
     }
     for (auto* changed : {&entry.once_plain, &entry.once_paced}) {
       if (changed->erase(node_index) != 0) changed->insert(new_index);
-    }
-    entry.untold.renumber(node_index, new_index);
-    // Its own provider does not know its new id yet, and asks how many there are when it does.
-    if (!entry.service || entry.service->provider == new_index) continue;
-    // First the one that comes: a provider that hears of no subscribers stops.
-    const auto count = static_cast<std::uint32_t>(list.size());
-    for (const bool joined : {true, false}) {
-      effects.emplace_back(SubscriberDue{entry.service->provider, entry.service->group,
-                                         joined ? new_index : node_index, count, joined});
     }
   }
 }
@@ -295,7 +241,8 @@ const Topic* Services::find_group(GroupIndex group) const {
 
 const ServiceTerms* Services::provided(NodeIndex node, std::string_view full_name) const {
   const auto known = topics_.find(full_name);
-  if (known == topics_.end() || !known->second.service || known->second.service->provider != node)
+  if (known == topics_.end() || !known->second.provided() ||
+      known->second.service->provider != node)
     return nullptr;
   return &known->second.service->terms;
 }
@@ -307,6 +254,11 @@ std::optional<SubscriberTerms> Services::subscribed(NodeIndex node,
     return std::nullopt;
   const auto asked = known->second.terms.find(node);
   return asked != known->second.terms.end() ? asked->second : SubscriberTerms{};
+}
+
+const Topic* Services::find(std::string_view full_name) const {
+  const auto known = topics_.find(full_name);
+  return known == topics_.end() ? nullptr : &known->second;
 }
 
 std::size_t Services::services_of(NodeIndex node) const {
@@ -352,22 +304,20 @@ void Services::forget_subscriber(Topic& topic, NodeIndex subscriber) {
   topic.terms.erase(subscriber);
   topic.once_plain.erase(subscriber);
   topic.once_paced.erase(subscriber);
-  topic.untold.forget(subscriber);
 }
 
-void Services::remove_subscriber(Topic& topic, NodeIndex node, Effects& effects) {
+void Services::remove_subscriber(Topic& topic, NodeIndex node, milliseconds now, Effects& effects) {
   auto& list = topic.subscribers;
   const auto place = std::lower_bound(list.begin(), list.end(), node);
   GIMNET_CHECK(place != list.end() && *place == node);
   const bool paced = topic.pace_of(node).has_value();
   forget_subscriber(topic, node);
   list.erase(place);
-  const auto number = static_cast<std::uint32_t>(list.size());
   if (topic.service) {
     effects.emplace_back(MemberChanged{topic.service->group, node});
-    if (paced) effects.emplace_back(PaceEnded{node, topic.service->group, false});
-    effects.emplace_back(
-        SubscriberDue{topic.service->provider, topic.service->group, node, number, false});
+    if (paced) effects.emplace_back(PaceEnded{node, topic.service->group});
+    effects.emplace_back(SubscribersChanged{std::string{topic.full_name}});
+    note_if_unused(topic, now);
   }
   forget_if_unused(topic);
 }

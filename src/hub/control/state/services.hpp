@@ -5,7 +5,6 @@
 #include <functional>
 #include <map>
 #include <optional>
-#include <span>
 #include <string>
 #include <string_view>
 #include <unordered_map>
@@ -13,10 +12,9 @@
 #include <vector>
 
 #include "base/result.hpp"
+#include "hub/control/state/due_list.hpp"
 #include "hub/control/state/effects.hpp"
-#include "hub/control/state/group_proof.hpp"
 #include "hub/control/state/index_pool.hpp"
-#include "hub/control/state/untold_moves.hpp"
 #include "hub/limits.hpp"
 #include "proto/control/control_message.hpp"
 
@@ -34,16 +32,18 @@ struct ServiceTerms {
   friend bool operator==(const ServiceTerms&, const ServiceTerms&) = default;
 };
 
+/// A group id stands for a full name with its terms, whoever provides it.
 struct Service {
   GroupIndex group;
-  NodeIndex provider;
-  ServiceTerms terms;
+  NodeIndex provider;  ///< kNobody: nobody at the moment
+  ServiceTerms terms;  ///< the latest provider's
 };
+inline constexpr NodeIndex kNobody{};
 
-/// A full name that somebody provides, or waits for, or both.
+/// A full name that somebody provides, or waits for, or that still has a group id.
 struct Topic {
   std::string_view full_name;
-  std::optional<Service> service;
+  std::optional<Service> service;                        ///< nothing: no group id
   std::vector<NodeIndex> subscribers;                    ///< ascending
   std::unordered_map<NodeIndex, SubscriberTerms> terms;  ///< of those that asked for something
   /// Subscribers that changed their terms in this group: that got everything and are paced now; and
@@ -51,51 +51,44 @@ struct Topic {
   /// them goes before what comes.
   std::unordered_set<NodeIndex> once_plain;
   std::unordered_set<NodeIndex> once_paced;
-  UntoldMoves untold;
+  std::uint64_t change = 0;  ///< number of the last one that subscribers were told; 0: none
+  std::uint64_t orphan = 0;  ///< since when, in order, nobody provides the group; 0: somebody does
+  std::uint64_t unused = 0;  ///< since when nobody has subscribed either; 0: it is used
 
+  [[nodiscard]] bool provided() const { return service && service->provider != kNobody; }
   /// What the shards hold that subscriber to; nothing if it simply gets everything.
   [[nodiscard]] std::optional<SubscriberTerms> pace_of(NodeIndex subscriber) const;
+  /// In force; 0: the subscriber's messages are not counted.
+  [[nodiscard]] std::uint32_t window_of(NodeIndex subscriber) const {
+    const std::optional<SubscriberTerms> pace = pace_of(subscriber);
+    return pace ? pace->window : 0;
+  }
 };
 
-/// Services and subscriptions by full name; each service owns a group. Nodes are named by index,
-/// and what a node declared stays while its session lives, its grace time included. Thread safety:
-/// none. Limits: services_per_node, subscriptions_per_node.
+/// Services and subscriptions by full name. A group id stands for a name with its terms, and goes
+/// from one provider to the next. Nodes are named by index, and what a node declared stays while
+/// its session lives, its grace time included. Thread safety: none. Limits: services_per_node,
+/// subscriptions_per_node; group ids, of which those go first that nobody provides.
 class Services {
  public:
   /// In the order of names, which no choice of names can make slow, and which finds at once all
   /// that begin alike.
   using Topics = std::map<std::string, Topic, std::less<>>;
 
-  /// Until `returns_until` providers of before a restart may come back. `secret` proves who had a
-  /// group.
-  Services(HubId hub, const Limits& limits, const IndexRange& groups = {},
-           std::chrono::milliseconds returns_until = {}, const Secret& secret = {});
+  Services(HubId hub, const Limits& limits, const IndexRange& groups = {});
 
   struct Advertised {
     GroupIndex group;
     std::uint32_t subscribers = 0;
-    GroupProof proof{};  ///< for FormerGroup, from now on
   };
-  /// The group that a service had before its hub or its session came back, as its provider says,
-  /// or kNoGroup.
-  struct FormerGroup {
-    GroupIndex group;
-    std::span<const std::byte> proof{};
-  };
-  /// A provider that advertises again what it provides keeps the group; if more than the metadata
-  /// differs it gets a new one, which its subscribers are told before it is published. A service
-  /// that it begins gets the `former` group if the proof is right, nobody else got it since, and
-  /// nobody has it now. Errors: bad_request, taken, limit.
-  [[nodiscard]] Result<Advertised, proto::Refusal> advertise(
-      NodeIndex provider, std::string_view full_name, const ServiceTerms& terms,
-      std::chrono::milliseconds now, Effects& effects, const FormerGroup& former);
+  /// The name keeps its group, whoever advertises it, if no more than the metadata differs from
+  /// what the group stands for. Else it gets a new one, which its subscribers are told before it is
+  /// published. Errors: bad_request, taken, limit.
   [[nodiscard]] Result<Advertised, proto::Refusal> advertise(NodeIndex provider,
                                                              std::string_view full_name,
                                                              const ServiceTerms& terms,
                                                              std::chrono::milliseconds now,
-                                                             Effects& effects) {
-    return advertise(provider, full_name, terms, now, effects, FormerGroup{});
-  }
+                                                             Effects& effects);
   /// Errors: not_found, denied. nullopt: done.
   [[nodiscard]] std::optional<proto::Refusal> withdraw(NodeIndex provider, GroupIndex group,
                                                        std::chrono::milliseconds now,
@@ -109,6 +102,7 @@ class Services {
   /// Errors: not_found. nullopt: done.
   [[nodiscard]] std::optional<proto::Refusal> unsubscribe(NodeIndex node_index,
                                                           std::string_view full_name,
+                                                          std::chrono::milliseconds now,
                                                           Effects& effects);
 
   /// The node came back on a new connection: it will declare again what it still wants.
@@ -122,16 +116,27 @@ class Services {
   /// The node's session is over.
   void node_left(NodeIndex node_index, std::chrono::milliseconds now, Effects& effects);
 
-  /// What the node is to be told, since it came back: each service whose moves it may not know of,
-  /// once, and where it is now. To be told again at its next return unless moves_read() came.
-  [[nodiscard]] std::vector<ServiceMovedDue> untold_moves(NodeIndex node) const;
-  /// The node has read what it was told of that move (ServiceMovedDue), and of those before it.
-  void moves_read(NodeIndex node, std::uint64_t move);
+  /// Gives back the groups that nobody used for a grace time.
+  void tick(std::chrono::milliseconds now, Effects& effects);
+  /// When tick() has something to do; nothing while nothing runs out.
+  [[nodiscard]] std::optional<std::chrono::milliseconds> next_deadline() const;
+  void put_off(std::chrono::milliseconds time, std::chrono::milliseconds latest) {
+    unused_.put_off(time, latest);
+  }
 
+  /// Grows with each ServiceMoved.
+  [[nodiscard]] std::uint64_t changes() const { return changes_; }
+  /// What the node subscribed to and subscribers were told of since that change, the latest last.
+  [[nodiscard]] std::vector<const Topic*> moved_since(NodeIndex node, std::uint64_t change) const;
+
+  /// nullptr: nobody provides it, nor waits for it.
+  [[nodiscard]] const Topic* find(std::string_view full_name) const;
   /// nullptr: no such group.
   [[nodiscard]] const Topic* find_group(GroupIndex group) const;
-  /// Topics with a service, by ascending group index.
+  /// Topics with a group, by ascending group index; some are provided by nobody.
   [[nodiscard]] const std::map<GroupIndex, Topic*>& groups() const { return groups_; }
+  /// Services that somebody provides.
+  [[nodiscard]] std::size_t provided() const { return groups_.size() - orphans_.size(); }
   [[nodiscard]] const Topics& by_name() const { return topics_; }
   /// What the node declared of that service; nothing: it has not. The pointer holds until something
   /// changes here.
@@ -156,6 +161,12 @@ class Services {
     std::vector<Declared> provides;
     std::vector<Declared> subscribes;
   };
+  /// A group that nobody uses. Void once it is used or gone.
+  struct Unused {
+    std::chrono::milliseconds until;
+    GroupIndex group;
+    std::uint64_t since = 0;  ///< Topic::unused
+  };
 
   /// Takes out of `list` what was not declared in that life.
   [[nodiscard]] static std::vector<Declared> take_undeclared(std::vector<Declared>& list,
@@ -163,34 +174,37 @@ class Services {
   Topic& topic(std::string_view full_name);
   void forget_if_unused(Topic& topic);
   void forget_if_idle(NodeIndex node);
-  [[nodiscard]] GroupGrant grant_of(GroupIndex group, std::string_view full_name) const;
-  /// Was it that service that was given the group last?
-  [[nodiscard]] bool is_proven(const FormerGroup& former, std::string_view full_name) const;
-  /// For a service that begins: the group that it had, or a new one.
-  [[nodiscard]] std::optional<GroupIndex> take_group(const FormerGroup& former,
-                                                     std::string_view full_name,
-                                                     std::chrono::milliseconds now);
-  void open_group(Topic& topic, const Service& service, GroupIndex old_group, Effects& effects);
-  static void end_group(const Topic& topic, Effects& effects);
+  /// A group that no other name has; the oldest ones that nobody provides make room.
+  [[nodiscard]] std::optional<GroupIndex> take_group(std::chrono::milliseconds now,
+                                                     Effects& effects);
+  void enter_group(Topic& topic, const Service& service, std::chrono::milliseconds now,
+                   Effects& effects);
+  void take_over(Topic& topic, NodeIndex provider, const ServiceTerms& terms, Effects& effects);
+  void end_provision(Topic& topic, std::chrono::milliseconds now, Effects& effects);
+  void leave_group(Topic& topic, std::chrono::milliseconds now, Effects& effects);
+  void give_back(Topic& topic, std::chrono::milliseconds now, Effects& effects);
+  void note_use(Topic& topic);
+  void note_if_unused(Topic& topic, std::chrono::milliseconds now);
+  [[nodiscard]] bool is_void(const Unused& note) const;
   static void begin_pace(const Topic& topic, NodeIndex subscriber, Effects& effects);
   static void forget_subscriber(Topic& topic, NodeIndex subscriber);
   void change_terms(Topic& topic, NodeIndex subscriber, const SubscriberTerms& terms,
                     Effects& effects);
   [[nodiscard]] static ServiceNoted service_noted(proto::ns::ChangeKind kind, const Topic& topic);
-  void tell_subscribers(Topic& topic, ServiceMovedDue event, Effects& effects);
-  /// In force; 0: the subscriber's messages are not counted.
-  [[nodiscard]] static std::uint32_t window_of(const Topic& topic, NodeIndex subscriber);
-  void close_group(Topic& topic, std::chrono::milliseconds now, Effects& effects);
-  void remove_subscriber(Topic& topic, NodeIndex node, Effects& effects);
+  void tell_subscribers(Topic& topic, Effects& effects);
+  void remove_subscriber(Topic& topic, NodeIndex node, std::chrono::milliseconds now,
+                         Effects& effects);
 
   const HubId hub_;
   const Limits& limits_;
-  const Secret secret_;
   IndexPool group_indices_;
   Topics topics_;
   std::map<GroupIndex, Topic*> groups_;
+  std::map<std::uint64_t, Topic*> orphans_;  ///< by Topic::orphan: the oldest first
+  DueList<Unused> unused_;
   std::unordered_map<NodeIndex, Node> nodes_;
-  std::uint64_t moves_ = 0;
+  std::uint64_t changes_ = 0;
+  std::uint64_t orphaned_ = 0;  ///< numbers the orphans, and the times at which groups fell unused
 };
 
 }  // namespace gimnet::hub

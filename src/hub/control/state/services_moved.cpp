@@ -1,57 +1,121 @@
-#include "hub/control/state/services.hpp"
-
 #include <algorithm>
 
+#include "hub/control/state/services.hpp"
 #include "proto/control/ns.hpp"
 
-// How services come under groups and leave them, and who hears of it.
+// How names get group ids and providers, and lose them, and who hears of it.
 
 namespace gimnet::hub {
 namespace {
-
 using proto::ns::ChangeKind;
 using std::chrono::milliseconds;
-
-static_assert(UntoldMoves::kBetweenMax == proto::ns::kGroupsBetweenMax);
-
-ServiceMovedDue moved(const Topic& topic, const Service& service, GroupIndex old_group,
-                      GroupIndex new_group) {
-  ServiceMovedDue event;
-  event.full_name = std::string{topic.full_name};
-  event.old_group = old_group;
-  event.new_group = new_group;
-  event.message_type = service.terms.message_type;
-  event.instance = service.terms.instance;
-  event.delivery = service.terms.delivery;
-  event.retain = service.terms.retain;
-  event.direction = service.terms.direction;
-  return event;
-}
-
 }  // namespace
 
 ServiceNoted Services::service_noted(ChangeKind kind, const Topic& topic) {
   return {kind, topic.service->group, topic.service->provider, std::string{topic.full_name}};
 }
 
-void Services::open_group(Topic& topic, const Service& service, GroupIndex old_group,
-                          Effects& effects) {
+std::optional<GroupIndex> Services::take_group(milliseconds now, Effects& effects) {
+  constexpr std::uint32_t kHeldMost = kIndexMost / 4 * 3;
+  while (group_indices_.held() >= kHeldMost && !orphans_.empty())
+    give_back(*orphans_.begin()->second, now, effects);
+  const std::optional<std::uint32_t> index = group_indices_.take(now);
+  if (group_indices_.keeping_due(now)) effects.emplace_back(StateDue{});
+  return index ? std::optional{GroupIndex{*index}} : std::nullopt;
+}
+
+/// A name has a group that it had not before: a new name, or other terms.
+void Services::enter_group(Topic& topic, const Service& service, milliseconds now,
+                           Effects& effects) {
+  const std::optional<Service> former = topic.service;
+  if (topic.provided()) effects.emplace_back(service_noted(ChangeKind::withdrawn, topic));
+  if (former) leave_group(topic, now, effects);
+  if (former && former->terms.retain && former->provider != kNobody)
+    effects.emplace_back(RetainedDropped{former->provider, former->group});
   topic.service = service;
-  topic.once_plain.clear();
-  topic.once_paced.clear();
   groups_[service.group] = &topic;
-  if (old_group != kNoGroup) {
-    effects.emplace_back(ServiceNoted{ChangeKind::withdrawn, old_group, service.provider,
-                                      std::string{topic.full_name}});
-  }
   // Who is told may send at once to a group that accepts data; of one that provides, messages come
   // at once to whoever may have to be told.
   const bool accepts = service.terms.direction == proto::ns::Direction::accepts;
   if (accepts) effects.emplace_back(GroupChanged{service.group});
-  tell_subscribers(topic, moved(topic, service, old_group, service.group), effects);
+  tell_subscribers(topic, effects);
   if (!accepts) effects.emplace_back(GroupChanged{service.group});
   for (const NodeIndex subscriber : topic.subscribers) begin_pace(topic, subscriber, effects);
   effects.emplace_back(service_noted(ChangeKind::advertised, topic));
+}
+
+/// Somebody provides what nobody did.
+void Services::take_over(Topic& topic, NodeIndex provider, const ServiceTerms& terms,
+                         Effects& effects) {
+  note_use(topic);
+  topic.service->provider = provider;
+  topic.service->terms.metadata = terms.metadata;
+  effects.emplace_back(ProviderChanged{topic.service->group});
+  tell_subscribers(topic, effects);
+  effects.emplace_back(service_noted(ChangeKind::advertised, topic));
+}
+
+/// First the table: a frame that is read before the provider's shard forgets the last message would
+/// make it anew, for ever.
+void Services::end_provision(Topic& topic, milliseconds now, Effects& effects) {
+  const ServiceNoted noted = service_noted(ChangeKind::withdrawn, topic);
+  topic.service->provider = kNobody;
+  topic.orphan = ++orphaned_;
+  orphans_[topic.orphan] = &topic;
+  effects.emplace_back(ProviderChanged{noted.group});
+  if (topic.service->terms.retain)
+    effects.emplace_back(RetainedDropped{noted.provider, noted.group});
+  tell_subscribers(topic, effects);
+  effects.emplace_back(noted);
+  note_if_unused(topic, now);
+}
+
+void Services::leave_group(Topic& topic, milliseconds now, Effects& effects) {
+  const GroupIndex group = topic.service->group;
+  note_use(topic);
+  for (const NodeIndex subscriber : topic.subscribers) {
+    if (topic.pace_of(subscriber)) effects.emplace_back(PaceEnded{subscriber, group});
+  }
+  topic.once_plain.clear();
+  topic.once_paced.clear();
+  topic.service.reset();
+  groups_.erase(group);
+  group_indices_.give_back(group.value(), now);
+  effects.emplace_back(GroupChanged{group});
+}
+
+/// REQUIRES: nobody provides it.
+void Services::give_back(Topic& topic, milliseconds now, Effects& effects) {
+  leave_group(topic, now, effects);
+  tell_subscribers(topic, effects);
+  forget_if_unused(topic);
+}
+
+void Services::note_use(Topic& topic) {
+  orphans_.erase(topic.orphan);
+  topic.orphan = topic.unused = 0;
+}
+
+void Services::note_if_unused(Topic& topic, milliseconds now) {
+  if (topic.provided() || !topic.subscribers.empty()) return;
+  topic.unused = ++orphaned_;
+  unused_.add({now + milliseconds{limits_.grace_ms}, topic.service->group, topic.unused},
+              orphans_.size(), [this](const Unused& note) { return is_void(note); });
+}
+
+bool Services::is_void(const Unused& note) const {
+  const Topic* topic = find_group(note.group);
+  return topic == nullptr || topic->unused != note.since;
+}
+
+void Services::tick(milliseconds now, Effects& effects) {
+  for (; !unused_.empty() && unused_.front().until <= now; unused_.pop_front()) {
+    if (!is_void(unused_.front())) give_back(*groups_.at(unused_.front().group), now, effects);
+  }
+}
+
+std::optional<milliseconds> Services::next_deadline() const {
+  return unused_.empty() ? std::nullopt : std::optional{unused_.front().until};
 }
 
 void Services::begin_pace(const Topic& topic, NodeIndex subscriber, Effects& effects) {
@@ -61,77 +125,21 @@ void Services::begin_pace(const Topic& topic, NodeIndex subscriber, Effects& eff
                                topic.once_plain.contains(subscriber)});
 }
 
-/// The topic's group is gone. First from the table: a frame that is read before the provider's
-/// shard forgets the last message would make it anew, for ever.
-void Services::end_group(const Topic& topic, Effects& effects) {
-  const Service& service = *topic.service;
-  effects.emplace_back(GroupChanged{service.group});
-  for (const NodeIndex subscriber : topic.subscribers) {
-    if (topic.pace_of(subscriber)) effects.emplace_back(PaceEnded{subscriber, service.group, true});
-  }
-  if (service.terms.retain) effects.emplace_back(RetainedDropped{service.provider, service.group});
+void Services::tell_subscribers(Topic& topic, Effects& effects) {
+  if (topic.subscribers.empty()) return;
+  topic.change = ++changes_;
+  effects.emplace_back(ServiceMoved{std::string{topic.full_name}});
 }
 
-void Services::close_group(Topic& topic, milliseconds now, Effects& effects) {
-  const Service service = *topic.service;
-  end_group(topic, effects);
-  topic.service.reset();
-  groups_.erase(service.group);
-  group_indices_.give_back(service.group.value(), now);
-  tell_subscribers(topic, moved(topic, service, service.group, kNoGroup), effects);
-  effects.emplace_back(ServiceNoted{ChangeKind::withdrawn, service.group, service.provider,
-                                    std::string{topic.full_name}});
-}
-
-void Services::tell_subscribers(Topic& topic, ServiceMovedDue event, Effects& effects) {
-  event.move = ++moves_;
-  std::map<std::uint32_t, std::vector<NodeIndex>> by_window;
-  for (const NodeIndex subscriber : topic.subscribers)
-    by_window[window_of(topic, subscriber)].push_back(subscriber);
-  for (auto& [window, subscribers] : by_window) {
-    event.subscribers = std::move(subscribers);
-    event.window = window;
-    effects.emplace_back(event);
-  }
-  topic.untold.on_moved(topic.subscribers, event.old_group, event.move);
-}
-
-std::uint32_t Services::window_of(const Topic& topic, NodeIndex subscriber) {
-  const std::optional<SubscriberTerms> pace = topic.pace_of(subscriber);
-  return pace ? pace->window : 0;
-}
-
-std::vector<ServiceMovedDue> Services::untold_moves(NodeIndex node) const {
-  std::vector<ServiceMovedDue> events;
+std::vector<const Topic*> Services::moved_since(NodeIndex node, std::uint64_t change) const {
+  std::vector<const Topic*> moved;
   const auto found = nodes_.find(node);
-  if (found == nodes_.end()) return events;
+  if (found == nodes_.end()) return moved;
   for (const Declared& declared : found->second.subscribes) {
-    const Topic& topic = *declared.topic;
-    const std::optional<UntoldMoves::Untold> untold = topic.untold.of(node);
-    if (!untold) continue;
-    // An id that was given back may be another service's by now, and would be taken from that.
-    const auto is_another = [&](GroupIndex group) { return groups_.contains(group); };
-    ServiceMovedDue event;
-    if (topic.service) event = moved(topic, *topic.service, kNoGroup, topic.service->group);
-    event.full_name = std::string{topic.full_name};
-    event.old_group = is_another(untold->known) ? kNoGroup : untold->known;
-    event.subscribers = {node};
-    event.window = window_of(topic, node);
-    event.move = untold->move;
-    event.again = true;
-    for (const GroupIndex group : untold->between) {
-      if (!is_another(group)) event.between.push_back(group);
-    }
-    events.push_back(std::move(event));
+    if (declared.topic->change > change) moved.push_back(declared.topic);
   }
-  return events;
-}
-
-void Services::moves_read(NodeIndex node, std::uint64_t move) {
-  const auto found = nodes_.find(node);
-  if (found == nodes_.end()) return;
-  for (const Declared& declared : found->second.subscribes)
-    declared.topic->untold.on_read(node, move);
+  std::ranges::sort(moved, {}, &Topic::change);
+  return moved;
 }
 
 }  // namespace gimnet::hub

@@ -60,6 +60,7 @@ struct Session {
   Origin origin;                             ///< of the latest connection
   Crowds::Entry* crowd = nullptr;            ///< in which it counts; null: in none
   std::chrono::milliseconds token_expiry{};  ///< since 1970
+  std::uint64_t change_seen = 0;             ///< of services, when its latest connection began
   std::chrono::milliseconds joined{};        ///< when the session began
   std::chrono::milliseconds connected_at{};  ///< when its latest connection was admitted
   std::unique_ptr<const Closing>

@@ -238,7 +238,8 @@ void Watches::add_services(Watch& watch, Page& page, Turn& turn) const {
   auto entry = all.upper_bound(watch.last_group);
   for (; entry != all.end() && turn.work > 0 && !page.full; ++entry, --turn.work) {
     watch.last_group = entry->first;
-    if (fits(watch, entry->second->full_name)) add_service(*entry->second, page);
+    if (entry->second->provided() && fits(watch, entry->second->full_name))
+      add_service(*entry->second, page);
   }
   if (entry == all.end()) next_phase(watch);
 }

@@ -51,12 +51,14 @@ void KeptMessage::begin_copy(std::uint32_t bytes, EgressContext& context) {
   if (!fits) chunk_ = context.pool.take_exact(bytes);
 }
 
-void KeptMessage::append_copy(const Run& frame, EgressContext& context) {
+std::byte* KeptMessage::append_copy(const Run& frame, EgressContext& context) {
   if (chunk_->capacity - chunk_used_ < frame.size) {
     chunk_ = context.pool.take_exact(std::max(frame.size, kCopyBytesMax));
     chunk_used_ = 0;
   }
+  std::byte* const place = chunk_->data + chunk_used_;
   add(copy_into_chunk(frame, context));
+  return place;
 }
 
 /// REQUIRES: there is room.

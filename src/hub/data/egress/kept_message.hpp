@@ -27,7 +27,8 @@ class KeptMessage {
   /// append_copy(). It does not count against the budget. Memory of the message before is used
   /// again where it fits.
   void begin_copy(std::uint32_t bytes, EgressContext& context);
-  void append_copy(const Run& frame, EgressContext& context);
+  /// Returns where the copy is, which nobody else has yet.
+  std::byte* append_copy(const Run& frame, EgressContext& context);
   void clear();
 
   /// Calls take(const Run&) for each stretch of frames, in order.

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
-#include <type_traits>
 
 #include "base/endian.hpp"
 
@@ -237,17 +236,12 @@ void Fanout::look_for_room() {
   }
 }
 
-void Fanout::post_fence(std::uint32_t ticket) { post_behind(MailKind::fence, {self_, ticket}); }
-
-void Fanout::post_last() { post_behind(MailKind::last, {self_, 0}); }
-
-void Fanout::post_behind(MailKind kind, const Fence& fence) {
+void Fanout::post_last() {
   post_all();
-  static_assert(std::is_trivially_copyable_v<Fence> && sizeof fence <= sizeof Mail::small);
   Mail mail;
-  mail.kind = kind;
-  mail.small_size = sizeof fence;
-  std::memcpy(mail.small, &fence, sizeof fence);
+  mail.kind = MailKind::last;
+  mail.small_size = sizeof self_;
+  std::memcpy(mail.small, &self_, sizeof self_);
   for (std::size_t shard = 0; shard < mailboxes_.size(); ++shard) {
     if (shard != self_.value()) post_word(ShardIndex{static_cast<std::uint8_t>(shard)}, mail);
   }

@@ -56,8 +56,6 @@ class Fanout {
   [[nodiscard]] RecipientTable& recipients() { return recipients_; }
   [[nodiscard]] EgressContext& context() { return context_; }
   [[nodiscard]] std::uint64_t take_wakeups() { return std::exchange(wakeups_, 0); }
-  /// Behind all that was handed over so far, to each other shard.
-  void post_fence(std::uint32_t ticket);
   /// To each other shard: nothing more will be handed over.
   void post_last();
   /// A word for a sender on another shard.
@@ -92,7 +90,6 @@ class Fanout {
   void make_room(Stretch& stretch, std::uint32_t bytes);
   [[nodiscard]] std::byte* copy_behind(Stretch& stretch, const Run& run);
   void post(ShardIndex to);
-  void post_behind(MailKind kind, const Fence& fence);
   void put(ShardIndex to, const Run& run, std::uint32_t deliveries = 0);
   /// The mailbox is full: what was sent with BLOCK goes through all the same, since its sender is
   /// not read until there is room; the rest is dropped.

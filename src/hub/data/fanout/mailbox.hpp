@@ -26,9 +26,8 @@ enum class MailKind : std::uint8_t {
   release,
   start_wanted,  ///< a subscriber of a retained group wants to begin: `small` is a GroupStart
   start,  ///< it begins here: what came before in this mailbox is not for it, what comes after is
-  fence,  ///< all that was handed over before was taken when this is: `small` is a Fence
   retained,  ///< frames of the last message, for that one subscriber
-  last,      ///< the sending shard drains and hands over nothing more: `small` is a Fence
+  last,      ///< the sending shard drains and hands over nothing more: `small` is its ShardIndex
 };
 
 /// A subscriber that begins with the last message of a group (RetainedMessages).
@@ -38,12 +37,7 @@ struct GroupStart {
   std::uint32_t generation = 0;
   std::uint32_t ticket = 0;  ///< numbers the starts that its shard asked for
   ShardIndex shard;
-};
-
-/// Asks when a shard has taken everything that another one handed over to it up to now.
-struct Fence {
-  ShardIndex of;             ///< that posted it
-  std::uint32_t ticket = 0;  ///< numbers the fences of that shard
+  NodeId provider;  ///< whose shard was asked
 };
 
 /// What one shard hands to another: a stretch of a slab with whole frames, once per burst, or a

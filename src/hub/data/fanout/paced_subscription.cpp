@@ -35,7 +35,7 @@ void PacedSubscription::on_begun(std::uint64_t now_us) {
 }
 
 void PacedSubscription::on_lost(std::uint64_t messages) {
-  lost_ += messages;
+  lost_ = std::min(lost_ + messages, sent_);
   // A subscriber may have credited what never left: it counts once.
   credited_ = std::min(credited_, sent_ - lost_);
 }
@@ -47,7 +47,8 @@ bool PacedSubscription::on_credit(std::uint64_t total) {
   return total <= reached;
 }
 
-void PacedSubscription::on_new_epoch(std::uint64_t waiting) {
+void PacedSubscription::begin_counts(std::uint8_t number, std::uint64_t waiting) {
+  number_ = number;
   sent_ = waiting;
   lost_ = credited_ = 0;
 }

@@ -52,8 +52,6 @@ class PacedSubscription {
   }
   /// A message begins to go to the subscriber.
   void on_begun(std::uint64_t now_us);
-  /// The next message is due whenever it comes, as if none had begun.
-  void restart_clock() { due_us_ = 0; }
   /// So many messages ended on their way to the subscriber.
   void on_sent(std::uint64_t messages) { sent_ += messages; }
   /// Of them, so many were dropped before they left.
@@ -61,8 +59,9 @@ class PacedSubscription {
   /// The subscriber says how many it took in total. False: it cannot be, and counts as all that
   /// were sent, or not at all where it is less than before.
   [[nodiscard]] bool on_credit(std::uint64_t total);
-  /// Both ends count from 0 again; so many ended messages still wait to be written.
-  void on_new_epoch(std::uint64_t waiting);
+  /// Both ends count from 0 under that number; so many ended messages still wait to be written.
+  void begin_counts(std::uint8_t number, std::uint64_t waiting);
+  [[nodiscard]] std::uint8_t number() const { return number_; }
   [[nodiscard]] std::uint64_t uncredited() const { return sent_ - lost_ - credited_; }
   [[nodiscard]] std::uint64_t due_us() const { return due_us_; }
 
@@ -96,8 +95,7 @@ class PacedSubscription {
   /// terms().depth.
   void push_newest(KeptMessage& message);
 
-  /// False: the subscription ended; its counts go on if it begins again on the same connection.
-  bool active = true;
+  NodeId source;  ///< of the latest frame
   /// The start that it asked the provider's shard for last (RetainedMessages), and that nothing is
   /// for it before that.
   std::uint32_t start_ticket = 0;
@@ -110,6 +108,7 @@ class PacedSubscription {
   Recipient& recipient_;
   const GroupId group_;
   PaceTerms terms_;
+  std::uint8_t number_ = 0;
   std::uint64_t sent_ = 0;
   std::uint64_t lost_ = 0;
   std::uint64_t credited_ = 0;

@@ -14,17 +14,17 @@ using State = PacedSubscription::Open::State;
 }  // namespace
 
 PacedSubscription& Pacer::subscribe(Recipient& recipient, GroupId group, const PaceTerms& terms,
-                                    bool was_plain) {
+                                    bool was_plain, std::uint8_t number) {
   if (!recipient.paced) {
     recipient.paced = std::make_unique<PacedBook>(recipient, ripe_);
     recipient.outbox.set_counted_groups(recipient.paced.get());
   }
   PacedSubscription* known = recipient.paced->find(group);
-  const bool begins = known == nullptr || !known->active;
-  if (known == nullptr) known = &recipient.paced->add(group, terms);
-  known->active = true;
-  if (begins && was_plain) begin_plain(*known);
-  if (begins) known->restart_clock();
+  if (known == nullptr) {
+    known = &recipient.paced->add(group, terms);
+    known->begin_counts(number, recipient.outbox.waiting_messages(group));
+    if (was_plain) begin_plain(*known);
+  }
   if (!(known->terms() == terms)) {
     unschedule(*known);  // it may be due earlier now
     known->set_terms(terms);
@@ -35,23 +35,29 @@ PacedSubscription& Pacer::subscribe(Recipient& recipient, GroupId group, const P
   return *known;
 }
 
-void Pacer::unsubscribe(Recipient& recipient, GroupId group, bool group_gone) {
+void Pacer::begin_counts(Recipient& recipient, GroupId group, std::uint8_t number) {
+  PacedSubscription* known = find(recipient, group);
+  if (known == nullptr) return;
+  known->begin_counts(number, recipient.outbox.waiting_messages(group));
+  release(*known);
+}
+
+void Pacer::unsubscribe(Recipient& recipient, GroupId group) {
   PacedSubscription* known = recipient.paced ? recipient.paced->find(group) : nullptr;
   if (known == nullptr) return;
   drop_held(*known, DropReason::no_subscriber);
   unschedule(*known);
-  known->active = false;
-  if (group_gone || recipient.paced->size() > kEndedMax) recipient.paced->erase(*known);
+  recipient.paced->erase(*known);
 }
 
 PacedSubscription* Pacer::find(const Recipient& recipient, GroupId group) {
-  PacedSubscription* known = recipient.paced ? recipient.paced->find(group) : nullptr;
-  return known != nullptr && known->active ? known : nullptr;
+  return recipient.paced ? recipient.paced->find(group) : nullptr;
 }
 
 bool Pacer::offer(PacedSubscription& subscription, const Run& run, const proto::FrameHeader& header,
                   Handover handover) {
   if (subscription.awaits_start) return false;
+  follow_source(subscription, NodeId{header.src});
   const Recipient& recipient = subscription.recipient();
   if (!recipient.connected && !recipient.waits_when_away) {
     drop(subscription, run, DropReason::away);
@@ -62,15 +68,22 @@ bool Pacer::offer(PacedSubscription& subscription, const Run& run, const proto::
     release(subscription);
   } else {
     give_up_stalled(subscription);
-    abandon(subscription, subscription.open(header.lane & proto::kLaneMask),
-            DropReason::cut_message);
+    Open& open = subscription.open(header.lane & proto::kLaneMask);
+    abandon(subscription, open, DropReason::cut_message);
     offer_plain(subscription, run, header, handover);
   }
   return true;
 }
 
-/// A message is the subscriber's whole or not at all, also where its pace begins in the middle of
-/// one.
+/// Another provider does not end what the former one began.
+void Pacer::follow_source(PacedSubscription& subscription, NodeId source) {
+  if (std::exchange(subscription.source, source) == source) return;
+  for (Open& open : subscription.open()) {
+    if (open.state != State::plain) abandon(subscription, open, DropReason::cut_message);
+  }
+}
+
+/// A message is the subscriber's whole or not at all, also where its pace begins within one.
 void Pacer::begin_plain(PacedSubscription& subscription) const {
   for (Open& open : subscription.open()) {
     open.state = State::plain;
@@ -78,8 +91,7 @@ void Pacer::begin_plain(PacedSubscription& subscription) const {
   }
 }
 
-/// A message that its provider gave up in one lane while it goes on in another would keep its place
-/// for ever.
+/// A message that its provider gave up in one lane, and not in another, would keep its place.
 void Pacer::give_up_stalled(PacedSubscription& subscription) {
   for (Open& open : subscription.open()) {
     if (open.state == State::none || context_.now_ms - open.came_ms < context_.limits.block_ms)
@@ -236,9 +248,8 @@ void Pacer::hold(PacedSubscription& subscription, KeptMessage& message, std::siz
   while (subscription.held() >= subscription.terms().depth)
     drop_oldest(subscription, DropReason::replaced);
   const std::uint64_t limit = context_.limits.lane_bytes(lane);
-  while (subscription.held() != 0 && subscription.held_bytes() + message.bytes() > limit) {
+  while (subscription.held() != 0 && subscription.held_bytes() + message.bytes() > limit)
     drop_oldest(subscription, DropReason::queue_full);
-  }
   subscription.push_newest(message);
 }
 
@@ -265,16 +276,16 @@ void Pacer::drop(PacedSubscription& subscription, const Run& run, DropReason rea
   context_.drops.drop(run.bytes, run.frames, reason);
 }
 
-bool Pacer::on_credit(const Recipient& recipient, GroupId group, std::uint64_t total) {
-  PacedSubscription* known = recipient.paced ? recipient.paced->find(group) : nullptr;
+bool Pacer::on_credit(const Recipient& recipient, const proto::flow::Credit& credit) {
+  PacedSubscription* known = find(recipient, credit.group);
   if (known == nullptr) return false;
-  const bool possible = known->on_credit(total);
+  if (known->number() != credit.number) return true;
+  const bool possible = known->on_credit(credit.taken);
   release(*known);
   return possible;
 }
 
 void Pacer::release(PacedSubscription& subscription) {
-  if (!subscription.active) return;
   while (subscription.may_begin(now_us()) && subscription.held() != 0) {
     // With a time between two, what is not the newest would only be older by then.
     while (subscription.terms().interval_us != 0 && subscription.held() > 1) {
@@ -321,7 +332,7 @@ void Pacer::write_kept(PacedSubscription& subscription, const KeptMessage& messa
 void Pacer::on_new_epoch(Recipient& recipient) {
   if (!recipient.paced) return;
   recipient.paced->for_each([&](PacedSubscription& each) {
-    each.on_new_epoch(recipient.outbox.waiting_messages(each.group()));
+    each.begin_counts(each.number(), recipient.outbox.waiting_messages(each.group()));
     release(each);
   });
 }
@@ -370,7 +381,7 @@ std::uint64_t Pacer::next_due_ms() const {
 }
 
 void Pacer::schedule(PacedSubscription& subscription) {
-  if (subscription.scheduled || !subscription.active || subscription.is_due(now_us())) return;
+  if (subscription.scheduled || subscription.is_due(now_us())) return;
   const bool arriving = std::any_of(subscription.open().begin(), subscription.open().end(),
                                     [](const Open& open) { return open.state == State::arriving; });
   if (subscription.space() == 0 || (subscription.held() == 0 && !arriving)) return;

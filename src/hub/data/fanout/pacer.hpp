@@ -6,6 +6,7 @@
 #include "hub/data/fanout/fanout.hpp"
 #include "hub/data/fanout/last_frames.hpp"
 #include "hub/data/fanout/paced_book.hpp"
+#include "proto/frame/flow.hpp"
 
 namespace gimnet::hub {
 
@@ -21,10 +22,13 @@ class Pacer {
   /// A subscription begins, or has new terms. Returns it. `was_plain`: the recipient got everything
   /// until it began, so that it has the beginning of what is just coming.
   PacedSubscription& subscribe(Recipient& recipient, GroupId group, const PaceTerms& terms,
-                               bool was_plain = false);
-  /// It ends. Its counts are kept for the next one on this connection, unless the group is gone.
-  void unsubscribe(Recipient& recipient, GroupId group, bool group_gone);
-  /// The subscription of that group; nullptr if the recipient has none that is active.
+                               bool was_plain = false, std::uint8_t number = 0);
+  /// Its counts begin at 0 under that number, with what is written from now on. Nothing if there is
+  /// no such subscription.
+  void begin_counts(Recipient& recipient, GroupId group, std::uint8_t number);
+  /// It ends, and its counts with it.
+  void unsubscribe(Recipient& recipient, GroupId group);
+  /// nullptr if the recipient has none that is paced.
   [[nodiscard]] static PacedSubscription* find(const Recipient& recipient, GroupId group);
 
   /// The next run is offered to subscriptions. Its last frame has `last_bytes`.
@@ -34,8 +38,8 @@ class Pacer {
   [[nodiscard]] bool offer(PacedSubscription& subscription, const Run& run,
                            const proto::FrameHeader& header, Handover handover);
   /// The recipient says how many messages of the group it took. False: it has no such subscription,
-  /// or the number cannot be.
-  [[nodiscard]] bool on_credit(const Recipient& recipient, GroupId group, std::uint64_t total);
+  /// or the total cannot be. Of former counts it changes nothing.
+  [[nodiscard]] bool on_credit(const Recipient& recipient, const proto::flow::Credit& credit);
 
   /// The recipient's counts begin anew; what still waits in its outbox will be written.
   void on_new_epoch(Recipient& recipient);
@@ -53,9 +57,6 @@ class Pacer {
  private:
   using Open = PacedSubscription::Open;
 
-  /// Subscriptions that ended and whose counts are kept, beside the active ones of a recipient.
-  static constexpr std::size_t kEndedMax = 1024;
-
   [[nodiscard]] std::uint64_t now_us() const { return context_.now_ms * 1000; }
   void offer_plain(PacedSubscription& subscription, const Run& run,
                    const proto::FrameHeader& header, Handover handover);
@@ -64,6 +65,7 @@ class Pacer {
   void offer_fragment(PacedSubscription& subscription, const Run& run,
                       const proto::FrameHeader& header, Handover handover);
   void begin_plain(PacedSubscription& subscription) const;
+  void follow_source(PacedSubscription& subscription, NodeId source);
   void give_up_stalled(PacedSubscription& subscription);
   void begin_message(PacedSubscription& subscription, Open& open, std::uint32_t number);
   void end_message(PacedSubscription& subscription, Open& open);

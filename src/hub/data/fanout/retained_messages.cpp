@@ -5,6 +5,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "base/endian.hpp"
 #include "proto/gimi/message_header.hpp"
 
 namespace gimnet::hub {
@@ -46,7 +47,10 @@ RetainedMessages::Entry& RetainedMessages::entry(const proto::FrameHeader& heade
     place = std::make_unique<Entry>();
     place->group = header.dst;
   }
-  if (place->provider != NodeId{header.src}) set_provider(*place, NodeId{header.src});
+  if (place->provider != NodeId{header.src}) {
+    let_go_all(*place);  // of another provider, whose session is not over, or not yet known to be
+    set_provider(*place, NodeId{header.src});
+  }
   return *place;
 }
 
@@ -96,6 +100,15 @@ bool RetainedMessages::charge(const Entry& entry, Kept& kept, std::uint64_t byte
 void RetainedMessages::let_go(const Entry& entry, Kept& kept) {
   kept.message.clear();
   static_cast<void>(charge(entry, kept, 0));
+}
+
+void RetainedMessages::let_go_all(Entry& entry) {
+  if (entry.provider == NodeId{}) return;
+  let_go(entry, entry.last);
+  for (Arriving& each : entry.arriving) {
+    each.open = false;
+    let_go(entry, each.kept);
+  }
 }
 
 void RetainedMessages::refuse(Entry& entry, const Run& run) {
@@ -165,9 +178,9 @@ void RetainedMessages::begin_fragments(Entry& entry, Arriving& arriving, const R
   arriving.kept.message.begin_copy(room_for(frame, run.size), context_);
 }
 
-void RetainedMessages::forget(GroupId group) {
+void RetainedMessages::forget(GroupId group, NodeId provider) {
   const auto found = entries_.find(group.value());
-  if (found == entries_.end()) return;
+  if (found == entries_.end() || found->second->provider != provider) return;
   budget_.give_back(static_cast<std::int64_t>(found->second->charged()));
   leave_provider(*found->second);
   entries_.erase(found);
@@ -190,8 +203,30 @@ void RetainedMessages::renumber_provider(NodeId former, NodeId provider) {
   if (former == provider) return;
   for (auto found = shares_.find(former.value()); found != shares_.end();
        found = shares_.find(former.value())) {
-    set_provider(*found->second.first, provider);
+    Entry& entry = *found->second.first;
+    // What had begun to come does not go on.
+    for (Arriving& each : entry.arriving) {
+      each.open = false;
+      let_go(entry, each.kept);
+    }
+    rename_source(entry.last.message, provider);
+    set_provider(entry, provider);
   }
+}
+
+/// A copy: other shards may still read the message as it is.
+void RetainedMessages::rename_source(KeptMessage& message, NodeId source) {
+  if (message.empty()) return;
+  KeptMessage renamed;
+  renamed.begin_copy(static_cast<std::uint32_t>(message.bytes()), context_);
+  message.for_each([&](const Run& run) {
+    std::byte* const copy = renamed.append_copy(run, context_);
+    for (std::size_t done = 0; done < run.size;
+         done += proto::load_header(copy + done).frame_size()) {
+      store_le(copy + done + proto::kSrcOffset, source.value());
+    }
+  });
+  std::swap(message, renamed);
 }
 
 void RetainedMessages::on_start_wanted(const GroupStart& start) {
@@ -203,7 +238,8 @@ void RetainedMessages::on_start_wanted(const GroupStart& start) {
     fanout_.post_word(start.shard, mail_about(MailKind::start, start));
   }
   const auto found = entries_.find(start.group.value());
-  if (found == entries_.end()) return;
+  // What is kept may be of a former provider on this shard.
+  if (found == entries_.end() || found->second->provider != start.provider) return;
   hand(start, found->second->last.message);
   for (const Arriving& arriving : found->second->arriving) hand(start, arriving.kept.message);
 }
@@ -231,11 +267,12 @@ void RetainedMessages::hand(const GroupStart& start, const KeptMessage& message)
 void RetainedMessages::ask_start(PacedSubscription& subscription) {
   const GroupMembers* members = groups_.find(index_of(subscription.group()));
   subscription.start_ticket = ++starts_;
-  subscription.awaits_start = true;
-  if (members == nullptr) return;  // the subscription is about to end
+  // Nothing is kept of a group that nobody provides.
+  subscription.awaits_start = members != nullptr && members->provided();
+  if (!subscription.awaits_start) return;
   const Recipient& recipient = subscription.recipient();
-  const GroupStart start{subscription.group(), recipient.slot, recipient.generation,
-                         subscription.start_ticket, fanout_.self()};
+  const GroupStart start{subscription.group(),      recipient.slot, recipient.generation,
+                         subscription.start_ticket, fanout_.self(), members->provider};
   if (members->provider_place.shard == fanout_.self()) return on_start_wanted(start);
   fanout_.post_word(members->provider_place.shard, mail_about(MailKind::start_wanted, start));
 }
@@ -249,9 +286,16 @@ PacedSubscription* RetainedMessages::subscription_of(const GroupStart& start) co
   return found != nullptr && found->start_ticket == start.ticket ? found : nullptr;
 }
 
+bool RetainedMessages::is_of_another(const GroupStart& start) const {
+  const GroupMembers* members = groups_.find(index_of(start.group));
+  return members != nullptr && members->provided() && members->provider != start.provider;
+}
+
 void RetainedMessages::on_start(const GroupStart& start) {
   PacedSubscription* subscription = subscription_of(start);
-  if (subscription != nullptr) subscription->awaits_start = false;
+  if (subscription == nullptr) return;
+  if (is_of_another(start)) return ask_start(*subscription);
+  subscription->awaits_start = false;
 }
 
 void RetainedMessages::on_handed(const GroupStart& start, const Run& frames) {
@@ -259,7 +303,7 @@ void RetainedMessages::on_handed(const GroupStart& start, const Run& frames) {
   PacedSubscription* subscription = subscription_of(start);
   for (Run rest = frames.share(); rest.frames != 0;) {
     const Run frame = rest.take_frame();
-    const bool taken = subscription != nullptr && subscription->active &&
+    const bool taken = subscription != nullptr && !is_of_another(start) &&
                        pacer_.offer(*subscription, frame, frame.header(), Handover{});
     if (!taken) context_.drops.drop(frame.bytes, 1, proto::DropReason::no_subscriber);
   }

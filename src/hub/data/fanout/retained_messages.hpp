@@ -20,7 +20,8 @@ namespace gimnet::hub {
 /// The subscriber's shard asks the provider's for a start. That sends the start and the last
 /// message by the mailbox through which it hands over the group's frames: what came before the
 /// start the subscriber does not get, what comes after it does. Of a message that is just coming it
-/// gets what came so far behind the last one.
+/// gets what came so far behind the last one. Where another node provides the group when the start
+/// comes, that one's shard is asked; where nobody does, the subscription is open at once.
 ///
 /// Kept messages lie in memory of their own and count by their application data, or by half of
 /// their bytes, where that is more: against retained_message_bytes, against retained_budget_bytes
@@ -43,11 +44,11 @@ class RetainedMessages {
 
   /// Frames of a retained group from their provider, as Router::route() gets them.
   void keep(const Run& run, const proto::FrameHeader& header, std::uint32_t last_bytes);
-  /// The group is gone.
-  void forget(GroupId group);
+  /// That provider provides the group no more.
+  void forget(GroupId group, NodeId provider);
   /// The provider's session is over.
   void forget_provider(NodeId provider);
-  /// The provider goes on under another id.
+  /// The provider goes on under another id, and so do its last messages.
   void renumber_provider(NodeId former, NodeId provider);
   /// A subscriber on whatever shard wants to begin.
   void on_start_wanted(const GroupStart& start);
@@ -98,6 +99,10 @@ class RetainedMessages {
   /// The message counts as `bytes` from now on. False: it may not, and counts as before.
   [[nodiscard]] bool charge(const Entry& entry, Kept& kept, std::uint64_t bytes);
   void let_go(const Entry& entry, Kept& kept);
+  void let_go_all(Entry& entry);
+  void rename_source(KeptMessage& message, NodeId source);
+  /// Another node provides the group by now than the one that was asked.
+  [[nodiscard]] bool is_of_another(const GroupStart& start) const;
   /// The message of this frame is not kept, nor any older one.
   void refuse(Entry& entry, const Run& run);
   void hand(const GroupStart& start, const KeptMessage& message);

@@ -115,10 +115,11 @@ const GroupMembers* Router::find_group(const Run& run, const proto::FrameHeader&
 void Router::to_group(const Run& run, const proto::FrameHeader& header, Arrival arrival) {
   const GroupMembers* members = find_group(run, header);
   if (members == nullptr) return;
-  // What was handed over was looked at by the shard that took it in.
-  if (!arrival.handed_over() && members->provider != NodeId{header.src}) {
-    return drop(
-        run, members->ends() ? proto::DropReason::no_such_group : proto::DropReason::not_allowed);
+  // Looked at for each run on every shard: no subscriber gets a former provider's frame after one
+  // of the next. The last frames of one that left are delivered while nobody provides the group.
+  if (members->provider != NodeId{header.src} && (members->provided() || !arrival.handed_over())) {
+    return drop(run, members->provided() ? proto::DropReason::not_allowed
+                                         : proto::DropReason::no_such_group);
   }
   const MemberList<GroupMember>& here = members->by_shard[fanout_.self().value()];
   const Handover handover{.fan_out = here.size() >= kReferenceRecipients};
@@ -188,7 +189,7 @@ void Router::to_other_shards(const Run& run, std::uint64_t shards, std::size_t d
 void Router::to_provider(const Run& run, const proto::FrameHeader& header, Arrival arrival) {
   const GroupMembers* members = find_group(run, header);
   if (members == nullptr) return;
-  if (members->ends()) return drop(run, proto::DropReason::no_such_group);
+  if (!members->provided()) return drop(run, proto::DropReason::no_such_group);
   if (!members->accepts) return drop(run, proto::DropReason::not_allowed);
   Recipient* recipient = find_here(run, members->provider_place, arrival);
   if (recipient != nullptr) fanout_.deliver(*recipient, run, header, Handover{});

@@ -29,7 +29,7 @@ struct PacedMember {
 /// less is cheap in a group of any size. Thread safety: immutable once published. Ownership: the
 /// table publisher, which frees it when no shard can still look at it (concurrent/quiescence.hpp).
 struct GroupMembers {
-  NodeId provider;
+  NodeId provider;  ///< 0: nobody at the moment
   /// Where its provider's session lives: frames to the service go there.
   NodePlace provider_place;
   /// One entry per shard of the hub, each with the members that live there.
@@ -39,9 +39,7 @@ struct GroupMembers {
   bool retain = false;  ///< the provider's shard keeps the last message; then all members are paced
   bool accepts = false;  ///< the service takes data: frames of kind SERVICE go to its provider
 
-  /// It has no provider any more: nothing is taken in for it, but what was handed over before is
-  /// delivered.
-  [[nodiscard]] bool ends() const { return provider == NodeId{}; }
+  [[nodiscard]] bool provided() const { return provider != NodeId{}; }
 };
 
 /// Group index to recipients, for the groups that this hub owns. Thread safety: one writer (the

@@ -43,19 +43,6 @@ inline void answer_advertise(FakeConnection& hub, const std::string& name, std::
                        : proto::encode_refusal(header, {proto::Status::limit, "no more"}));
 }
 
-/// The next request is ADVERTISE of `odom`, which had that group and shows that proof; `answer` is
-/// what it gets.
-inline void expect_claim(FakeConnection& hub, std::uint32_t group,
-                         const std::vector<std::byte>& proof,
-                         const proto::ns::AdvertiseAnswer& answer) {
-  std::uint16_t number = 0;
-  const auto request = hub.next_request<proto::ns::Advertise>(number);
-  ASSERT_TRUE(request);
-  EXPECT_EQ(request->former_group, GroupId{group});
-  EXPECT_EQ(request->former_proof, proof);
-  hub.send_control(proto::Kind::ns, proto::encode_answer(answer, number));
-}
-
 inline void advertise(Connected& connected, const char* name, std::uint32_t group, bool retain,
                       std::uint32_t type = 0) {
   std::thread asking([&] {

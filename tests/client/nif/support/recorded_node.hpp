@@ -121,6 +121,8 @@ class RecordedNode {
     ASSERT_EQ(nif_subscribe_paced(node_, wanted.name.c_str(), &pace, &subscription, kPatienceMs),
               NIF_OK);
     EXPECT_EQ(subscription.group, said->group.value());
+    EXPECT_EQ(subscription.provider, said->provider.value());
+    EXPECT_EQ(subscription.session, said->session);
     EXPECT_EQ(subscription.message_type, said->message_type);
     EXPECT_EQ(subscription.window, said->window);
     EXPECT_EQ(subscription.retain != 0, said->retain);
@@ -269,25 +271,20 @@ class RecordedNode {
     if (step.is_about<proto::ns::WatchEvents>())
       return be_told_changes(*proto::decode<proto::ns::WatchEvents>(payload));
     ++events_;
-    if (step.is_about<proto::ns::SubscriberJoined>()) {
-      return be_told(NIF_SUBSCRIBER_JOINED, *proto::decode<proto::ns::SubscriberJoined>(payload));
-    }
-    if (step.is_about<proto::ns::SubscriberLeft>()) {
-      return be_told(NIF_SUBSCRIBER_LEFT, *proto::decode<proto::ns::SubscriberLeft>(payload));
+    if (step.is_about<proto::ns::Subscribers>()) {
+      const auto event = proto::decode<proto::ns::Subscribers>(payload);
+      return expect(NIF_SUBSCRIBERS, [&](const nif_incoming& in) {
+        EXPECT_EQ(in.group, event->group.value());
+        EXPECT_EQ(in.count, event->subscribers);
+      });
     }
     ASSERT_TRUE(step.is_about<proto::ns::ServiceMoved>());
     const auto event = proto::decode<proto::ns::ServiceMoved>(payload);
     expect(NIF_SERVICE_MOVED, [&](const nif_incoming& in) {
       EXPECT_EQ(in.text, event->name);
-      EXPECT_EQ(in.former_group, event->old_group.value());
-      EXPECT_EQ(in.group, event->new_group.value());
-    });
-  }
-  void be_told(nif_incoming_type type, const proto::ns::SubscriberChange& change) {
-    expect(type, [&](const nif_incoming& in) {
-      EXPECT_EQ(in.group, change.group.value());
-      EXPECT_EQ(in.from, change.node.value());
-      EXPECT_EQ(in.count, change.subscribers);
+      EXPECT_EQ(in.group, event->group.value());
+      EXPECT_EQ(in.from, event->provider.value());
+      EXPECT_EQ(in.count, event->session);
     });
   }
   void be_told_changes(const proto::ns::WatchEvents& events) {

@@ -265,55 +265,10 @@ TEST_F(AdministerTest, ServicesAndSubscriptionsFollowTheId) {
   const GroupMember* member = members->by_shard[viewer.shard.value()].find(viewer.session.slot);
   ASSERT_NE(member, nullptr);
   EXPECT_EQ(member->generation, viewer.session.generation);
-  const auto joined = events<ns::SubscriberJoined>();
-  ASSERT_THAT(joined, SizeIs(2));
-  EXPECT_EQ(joined[1].node, make_id<NodeId>(kHub, 60));
-  EXPECT_EQ(joined[1].subscribers, 1u);
-  EXPECT_EQ(events<ns::SubscriberLeft>().back().node, viewer.id);
-}
-
-// A provider that hears of no subscribers stops; one that hears of two waits for both.
-TEST_F(AdministerTest, ASubscriberThatIsRenumberedIsOneAllTheTime) {
-  ASSERT_TRUE(ask<ns::AdvertiseAnswer>(robot_, ns::Advertise{.service = "odom"}));
-  const Node viewer = join("viewer");
-  const Node other = join("other");
-  for (const Node& node : {viewer, other})
-    ASSERT_TRUE(ask<ns::SubscribeAnswer>(node, ns::Subscribe{"robot/odom"}));
-  const auto told = [this] {
-    std::vector<std::tuple<bool, NodeId, std::uint32_t>> found;
-    for (const auto* command : shards.all<SendControlCommand>()) {
-      const auto payload = payload_of(*command);
-      if (const auto joined = proto::decode<ns::SubscriberJoined>(payload)) {
-        found.emplace_back(true, joined->node, joined->subscribers);
-      } else if (const auto left = proto::decode<ns::SubscriberLeft>(payload)) {
-        found.emplace_back(false, left->node, left->subscribers);
-      }
-    }
-    shards.sent.clear();
-    return found;
-  };
-  static_cast<void>(told());
-  const NodeId second = make_id<NodeId>(kHub, 60);
-  ASSERT_TRUE(request(admin_, ctrl::Reassign{viewer.id, second}));
-  EXPECT_THAT(told(), ElementsAre(std::tuple{true, second, 2u}, std::tuple{false, viewer.id, 2u}));
-  detach(viewer, false, proto::GoodbyeCode::renumbered);
-  const Node again = rejoin(viewer, "viewer");
-  EXPECT_EQ(ask<ns::AdvertiseAnswer>(robot_, ns::Advertise{.service = "odom"})->subscribers, 2u);
-  ASSERT_TRUE(ask<ns::SubscribeAnswer>(again, ns::Subscribe{"robot/odom"}));
-  EXPECT_THAT(told(), SizeIs(0)) << "it declares what is known";
-  ASSERT_TRUE(ask<ns::UnsubscribeAnswer>(again, ns::Unsubscribe{"robot/odom"}));
-  EXPECT_THAT(told(), ElementsAre(std::tuple{false, second, 1u}));
-  // One that does not come back, and one whose provider is given another id meanwhile.
-  ASSERT_TRUE(request(admin_, ctrl::Reassign{other.id, make_id<NodeId>(kHub, 61)}));
-  ASSERT_TRUE(request(admin_, ctrl::Reassign{robot_.id, make_id<NodeId>(kHub, 62)}));
-  detach(other, false, proto::GoodbyeCode::renumbered);
-  detach(robot_, false, proto::GoodbyeCode::renumbered);
-  const Node provider = rejoin(robot_, "robot");
-  EXPECT_EQ(ask<ns::AdvertiseAnswer>(provider, ns::Advertise{.service = "odom"})->subscribers, 1u);
-  static_cast<void>(told());
-  now += std::chrono::milliseconds{limits.grace_ms};
-  conductor.tick(now);
-  EXPECT_THAT(told(), ElementsAre(std::tuple{false, make_id<NodeId>(kHub, 61), 0u}));
+  const auto moved = events<ns::ServiceMoved>();
+  ASSERT_FALSE(moved.empty());
+  EXPECT_EQ(moved.back().provider, make_id<NodeId>(kHub, 70));
+  EXPECT_EQ(moved.back().group, odom->group);
 }
 
 TEST_F(AdministerTest, AnIdThatIsHandedOutAgainLeadsToItsNewNode) {

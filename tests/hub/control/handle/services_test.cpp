@@ -123,43 +123,35 @@ TEST_F(ServiceRequestsTest, AReturningNodeFindsItsServiceWhereItWas) {
   proto::Hello hello;
   hello.token = robot.welcome.token;
   const Node back = join(hello);
-  const auto after = ask<ns::AdvertiseAnswer>(
-      back, ns::Advertise{.service = "odom", .former_group = before->group});
-  EXPECT_EQ(after->group, before->group) << "while the session is there nothing has to be proven";
+  const auto after = ask<ns::AdvertiseAnswer>(back, ns::Advertise{.service = "odom"});
+  EXPECT_EQ(after->group, before->group);
 }
 
-TEST_F(ServiceRequestsTest, AfterARestartAServiceGetsItsFormerGroupIfItProvesThatItHadIt) {
-  const auto odom = ask<ns::AdvertiseAnswer>(join("robot"), ns::Advertise{.service = "odom"});
-  ASSERT_TRUE(odom);
-  EXPECT_EQ(index_of(odom->group), 1u);
-  EXPECT_EQ(odom->proof.size(), 16u);
-  HubStart start;
-  start.groups = {100, IndexPool::kBlock};
-  TestConductor after(Placement::spread, start);
-  const auto claim = [&](const Node& node, const char* service, const ns::AdvertiseAnswer& before) {
-    const ns::Advertise offer{
-        .service = service, .former_group = before.group, .former_proof = before.proof};
-    const auto answer = after.ask<ns::AdvertiseAnswer>(node, offer);
-    EXPECT_TRUE(answer);
-    return answer ? index_of(answer->group) : 0;
-  };
-  EXPECT_EQ(claim(after.join("thief"), "odom", *odom), 100u) << "its full name is another one";
-  const Node robot = after.join("robot");
-  EXPECT_EQ(claim(robot, "scan", *odom), 101u) << "another service";
-  EXPECT_EQ(claim(robot, "map", {odom->group, 0}), 102u) << "no proof";
-  EXPECT_EQ(claim(robot, "odom", {make_id<GroupId>(HubId{8}, 1), 0, odom->proof}), 103u)
-      << "another hub's group";
-  ASSERT_TRUE(after.ask<ns::WithdrawAnswer>(robot, ns::Withdraw{make_id<GroupId>(kHub, 103)}));
-  EXPECT_EQ(claim(robot, "odom", *odom), 1u) << "no token is needed";
-}
-
-TEST_F(ServiceRequestsTest, AProofThatIsTooLongIsABadRequest) {
+TEST_F(ServiceRequestsTest, CountsBeginWithAnAnswerOfAnotherNumber) {
   const Node robot = join("robot");
-  ns::Advertise offer{.service = "odom", .former_group = make_id<GroupId>(kHub, 9)};
-  offer.former_proof.resize(ns::kGroupProofBytesMax);
-  EXPECT_TRUE(ask<ns::AdvertiseAnswer>(robot, offer));
-  offer.former_proof.resize(ns::kGroupProofBytesMax + 1);
-  EXPECT_EQ(ask<ns::AdvertiseAnswer>(robot, offer).error().status, Status::bad_request);
+  const Node viewer = join("viewer");
+  ns::Advertise offer{.service = "map", .delivery = ns::Delivery::sync, .window = 4};
+  const auto map = ask<ns::AdvertiseAnswer>(robot, offer);
+  ASSERT_TRUE(map);
+  const auto begun = [&](ns::Subscribe wanted) {
+    shards.sent.clear();
+    const auto answer = ask<ns::SubscribeAnswer>(viewer, wanted);
+    EXPECT_TRUE(answer);
+    EXPECT_EQ(answer->number, wanted.number);
+    const auto& counts = shards.all<SendControlCommand>().back()->counts;
+    if (counts) {
+      EXPECT_EQ(counts->group, map->group);
+    }
+    return counts ? std::optional{counts->number} : std::nullopt;
+  };
+  EXPECT_EQ(begun({.name = "robot/map", .number = 7}), 7);
+  EXPECT_EQ(shards.all<PaceCommand>().size(), 1u);
+  EXPECT_EQ(begun({.name = "robot/map", .number = 7}), std::nullopt) << "it is only repeated";
+  EXPECT_EQ(begun({.name = "robot/map", .window = 2, .number = 7}), std::nullopt);
+  EXPECT_EQ(begun({.name = "robot/map", .window = 2, .number = 8}), 8);
+  offer = {.service = "odom"};
+  ASSERT_TRUE(ask<ns::AdvertiseAnswer>(robot, offer));
+  EXPECT_EQ(begun({.name = "robot/odom", .number = 9}), std::nullopt) << "nothing is counted";
 }
 
 TEST_F(ServiceRequestsTest, WhatStandsOutlivesALoweredLimitAndAReturn) {
@@ -242,11 +234,11 @@ TEST_F(ServiceRequestsTest, WithdrawingAndUnsubscribing) {
   EXPECT_EQ(ask<ns::WithdrawAnswer>(viewer, ns::Withdraw{group->group}).error().status,
             Status::denied);
   ASSERT_TRUE(ask<ns::UnsubscribeAnswer>(viewer, ns::Unsubscribe{"robot/odom"}));
-  EXPECT_EQ(events<ns::SubscriberLeft>().size(), 1u);
+  EXPECT_EQ(events<ns::Subscribers>().size(), 2u);
   EXPECT_EQ(ask<ns::UnsubscribeAnswer>(viewer, ns::Unsubscribe{"robot/odom"}).error().status,
             Status::not_found);
   ASSERT_TRUE(ask<ns::WithdrawAnswer>(robot, ns::Withdraw{group->group}));
-  EXPECT_EQ(groups.find(index_of(group->group)), nullptr);
+  EXPECT_FALSE(groups.find(index_of(group->group))->provided());
   EXPECT_EQ(ask<ns::WithdrawAnswer>(robot, ns::Withdraw{group->group}).error().status,
             Status::not_found);
   EXPECT_EQ(
@@ -383,10 +375,10 @@ TEST_F(ServiceRequestsTest, AStormOfSubscriptionsEndsAtTheQuotaAndThenAtTheRate)
   for (int i = 0; i < 100'000; ++i) {
     static_cast<void>(ask<ns::SubscribeAnswer>(other, ns::Subscribe{"robot/s"}));
     static_cast<void>(ask<ns::UnsubscribeAnswer>(other, ns::Unsubscribe{"robot/s"}));
-    said[Status::taken] += static_cast<int>(events<ns::SubscriberJoined>().size());
+    said[Status::taken] += static_cast<int>(events<ns::Subscribers>().size());
     shards.sent.clear();
   }
-  EXPECT_EQ(said[Status::taken], 2'048);
+  EXPECT_EQ(said[Status::taken], 2 * 2'048) << "each comes and goes";
 }
 
 }  // namespace

@@ -21,22 +21,7 @@ HubState some_state() {
   state.kicked = {{NodeIndex{3}, 77, 5s}, {NodeIndex{1'048'574}, 78, 6s}};
   for (std::uint32_t index = 1; index < state.node_mark; ++index) state.nodes_used.insert(index);
   state.nodes_used.insert(8'200);
-  state.groups_used.insert(3);
-  state.groups_used.insert(4);
-  state.group_forgettings = 2;
-  state.groups_outlasting.insert(4);
   return state;
-}
-
-/// The layouts before that of today, of a state that has nothing else.
-std::vector<std::byte> written_by_version(int version, HubState state) {
-  state.group_forgettings = 0;
-  state.groups_outlasting = IndexSet{};
-  if (version == 1) state.nodes_used = state.groups_used = IndexSet{};
-  std::vector<std::byte> bytes = write_hub_state(state);
-  bytes[8] = static_cast<std::byte>(version);
-  bytes.erase(bytes.begin() + 88, bytes.begin() + 104);
-  return bytes;
 }
 
 /// With the digest that belongs to the changed bytes.
@@ -59,8 +44,6 @@ TEST(HubState, IsReadAsItWasWritten) {
   HubState full = some_state();
   full.kicked.assign(kKickedMax, {NodeIndex{1}, 2, 3s});
   full.nodes_used.insert(1'048'574);
-  full.groups_used.insert(1'048'574);
-  full.groups_outlasting.insert(1'048'574);
   EXPECT_EQ(write_hub_state(full).size(), kHubStateBytesMax);
   EXPECT_EQ(*read_hub_state(write_hub_state(full)), full);
 }
@@ -90,39 +73,36 @@ TEST(HubState, SaysWhatIsWrong) {
   wrong[0] = std::byte{'X'};
   EXPECT_THAT(fault_of(sealed(wrong)), HasSubstr("does not hold"));
   wrong = bytes;
-  for (const unsigned version : {0u, 4u}) {
+  for (const unsigned version : {0u, 3u, 5u}) {
     wrong[8] = static_cast<std::byte>(version);
     EXPECT_THAT(fault_of(sealed(wrong)), HasSubstr("version"));
   }
   wrong = bytes;
   wrong.back() ^= std::byte{1};
   EXPECT_THAT(fault_of(wrong), HasSubstr("damaged"));
-  for (const std::size_t offset : {72u, 76u, 104u}) {  // node mark, group mark, a kicked index
+  for (const std::size_t offset : {72u, 76u, 88u}) {  // node mark, group mark, a kicked index
     for (const std::uint32_t index : {0u, 1'048'575u}) {
       wrong = bytes;
       store_le(wrong.data() + offset, index);
       EXPECT_THAT(fault_of(sealed(wrong)), HasSubstr("numbers")) << offset << " " << index;
     }
   }
-  for (const std::size_t length : {12u, 80u, 84u, 96u}) {  // kicked tokens, bytes of the three sets
+  for (const std::size_t length : {12u, 80u}) {  // kicked tokens, bytes of the set
     wrong = bytes;
     store_le(wrong.data() + length, 0xFFFF'FFFFu);
     EXPECT_THAT(fault_of(sealed(wrong)), HasSubstr("length")) << length;
   }
-  for (const std::size_t unused : {100u, 103u, 108u, 111u}) {
+  for (const std::size_t unused : {84u, 87u, 92u, 95u}) {
     wrong = bytes;
     wrong[unused] = std::byte{1};
     EXPECT_THAT(fault_of(sealed(wrong)), HasSubstr("numbers")) << unused;
   }
-  const std::size_t nodes_used = 104 + 2 * 24;
+  const std::size_t nodes_used = 88 + 2 * 24;
   wrong = bytes;
   wrong[nodes_used] |= std::byte{1};  // index 0
   EXPECT_THAT(fault_of(sealed(wrong)), HasSubstr("numbers"));
   wrong = bytes;
-  wrong[wrong.size() - 33] =
-      std::byte{0};  // the last byte of the groups that outlasted a forgetting
-  EXPECT_THAT(fault_of(sealed(wrong)), HasSubstr("numbers"));
-  wrong[wrong.size() - 33] = std::byte{32};  // 5, which is not used
+  wrong[wrong.size() - 33] = std::byte{0};  // the last byte of the set, which ends with a bit
   EXPECT_THAT(fault_of(sealed(wrong)), HasSubstr("numbers"));
   wrong = bytes;
   store_le(wrong.data() + 64, kBootMax + 1);
@@ -141,9 +121,7 @@ TEST(HubState, TheNextStartHandsOutWhatIsAboveTheMarks) {
       << "what is granted is kept as used";
   EXPECT_TRUE(start->state.nodes_used.contains(8'193 + IndexPool::kBlock));
   EXPECT_EQ(start->groups.first, 4'097u);
-  EXPECT_EQ(start->groups.forgettings, 2u);
-  EXPECT_EQ(start->groups.outlasting, some_state().groups_outlasting);
-  EXPECT_EQ(start->state.group_forgettings, 2u) << "a start forgets nothing";
+  EXPECT_EQ(start->groups.count, IndexPool::kBlock);
   EXPECT_EQ(start->state.group_mark, 4'097u + IndexPool::kBlock);
   EXPECT_EQ(start->state.secret, some_state().secret);
   EXPECT_EQ(start->state.unique_id, some_state().unique_id);
@@ -167,34 +145,6 @@ TEST(HubState, AStartThatHasComeRoundHandsOutNothingThatSomebodyMayHave) {
   EXPECT_EQ(start->state.node_mark, 8'193u + IndexPool::kBlock)
       << "1'048'574, then what is above those used";
   EXPECT_TRUE(start->state.nodes_used.contains(1'048'574));
-}
-
-TEST(HubState, AFileWithoutSetsIsReadAndAllBelowItsMarksCountsAsUsed) {
-  const HubState old = some_state();
-  const auto state = read_hub_state(sealed(written_by_version(1, old)));
-  ASSERT_TRUE(state);
-  EXPECT_EQ(state->node_mark, old.node_mark);
-  EXPECT_EQ(state->kicked, old.kicked);
-  EXPECT_EQ(state->nodes_used.size(), 8'192u);
-  EXPECT_TRUE(state->nodes_used.contains(8'192));
-  EXPECT_EQ(state->groups_used.size(), 4'096u);
-  std::vector<std::byte> bytes = written_by_version(2, old);
-  bytes[8] = std::byte{1};
-  EXPECT_THAT(fault_of(sealed(bytes)), HasSubstr("numbers")) << "a set where there was none";
-}
-
-TEST(HubState, AFileFromBeforeThereWereProofsIsRead) {
-  HubState old = some_state();
-  const auto state = read_hub_state(sealed(written_by_version(2, old)));
-  ASSERT_TRUE(state);
-  old.group_forgettings = 0;
-  old.groups_outlasting = IndexSet{};
-  EXPECT_EQ(*state, old);
-  for (const int version : {1, 2}) {
-    const auto smallest = read_hub_state(sealed(written_by_version(version, HubState{})));
-    ASSERT_TRUE(smallest) << version;
-    EXPECT_EQ(*smallest, HubState{}) << version;
-  }
 }
 
 TEST(HubState, StartsAreCountedToTheEndAndNoFurther) {

@@ -165,27 +165,6 @@ TEST(IndexPool, ForgetsWhoIsGoneWhenFewAreLeftAndNobodyMayReturn) {
   EXPECT_EQ(pool.take(30s), 60'001u);
 }
 
-TEST(IndexPool, CountsItsForgettingsAndSaysWhatOutlastedTheLast) {
-  IndexPool pool(100'000, 40s, {60'001, 0, all_from_to(1, 60'000), 7, all_from_to(5, 6)});
-  ASSERT_TRUE(pool.take_back(1));
-  ASSERT_TRUE(pool.take_back(2));
-  pool.give_back(2, 10s);
-  EXPECT_EQ(pool.forgettings(), 7u);
-  EXPECT_TRUE(pool.outlasted_forgetting(5));
-  const IndexPool::Grant forgetting = pool.next_grant(10s);
-  EXPECT_EQ(forgetting.forgettings, 8u);
-  EXPECT_EQ(pool.forgettings(), 7u) << "it is not kept yet";
-  pool.grant(forgetting);
-  EXPECT_EQ(pool.forgettings(), 8u);
-  EXPECT_EQ(forgetting.outlasting, all_from_to(1, 2)) << "held, and at rest; none of those granted";
-  EXPECT_TRUE(pool.outlasted_forgetting(1));
-  EXPECT_FALSE(pool.outlasted_forgetting(5));
-  ASSERT_TRUE(pool.take(10s));
-  const IndexPool::Grant another = keep(pool, 10s);
-  EXPECT_EQ(another.forgettings, 8u) << "nothing was forgotten";
-  EXPECT_EQ(another.outlasting, all_from_to(1, 2));
-}
-
 TEST(IndexPool, ForgetsNobodyWhileHalfAreLeft) {
   IndexPool pool(100'000, 0ms, {1, 0, all_from_to(50'001, 100'000)});
   keep(pool);

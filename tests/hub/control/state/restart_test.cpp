@@ -30,7 +30,7 @@ class RestartTest : public ::testing::Test {
     options.hub = HubId{7};
     options.boot = boot;
     options.nodes = {kept.nodes.mark, IndexPool::kBlock, kept.nodes.used};
-    options.groups = {kept.groups.mark, IndexPool::kBlock, kept.groups.used};
+    options.groups = {kept.groups.mark, IndexPool::kBlock};
     options.kicked = kept.kicked;
     if (boot > 1) options.returns_until = std::chrono::milliseconds{limits_.grace_ms};
     return std::make_unique<Membership>(options, limits_);

@@ -1,140 +1,151 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "hub/control/state/services.hpp"
 #include "proto/control/ns.hpp"
+#include "tests/hub/control/state/support/services_rig.hpp"
+
+// Names get group ids and providers, and lose them: who hears of it.
 
 namespace gimnet::hub {
 namespace {
 
+using namespace std::chrono_literals;
+using proto::Status;
+using std::chrono::milliseconds;
+using test::kLogger;
+using test::kRobot;
+using test::kViewer;
+using test::odometry;
+using test::ServicesTest;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-constexpr NodeIndex kRobot{1};
-constexpr NodeIndex kViewer{2};
-constexpr NodeIndex kOther{4};
-
-class ServicesMovedTest : public ::testing::Test {
- protected:
-  /// Another message type, and so another group.
-  GroupIndex advertise(std::uint32_t type, const std::string& name = "robot/odom",
-                       GroupIndex former_group = kNoGroup) {
-    ServiceTerms terms;
-    terms.message_type = type;
-    terms.delivery = proto::ns::Delivery::sync;
-    terms.window = 3;
-    const GroupProof proof = write_group_proof({HubId{7}, former_group, name}, {});
-    const auto done =
-        services_.advertise(kRobot, name, terms, now_, effects_, {former_group, proof});
-    EXPECT_TRUE(done);
-    return done ? done->group : kNoGroup;
-  }
-  void subscribe(const std::string& name = "robot/odom") {
-    EXPECT_TRUE(services_.subscribe(kViewer, name, {}, effects_));
-  }
-  /// What the node is told at its return, if that is one service.
-  ServiceMovedDue told(NodeIndex node = kViewer) {
-    const std::vector<ServiceMovedDue> all = services_.untold_moves(node);
-    EXPECT_EQ(all.size(), 1u);
-    return all.empty() ? ServiceMovedDue{} : all.front();
-  }
-  std::uint64_t last_move() const {
-    std::uint64_t move = 0;
-    for (const Effect& effect : effects_) {
-      if (const auto* moved = std::get_if<ServiceMovedDue>(&effect))
-        move = std::max(move, moved->move);
-    }
-    return move;
-  }
-
-  Limits limits_;
-  Services services_{HubId{7}, limits_};
-  Effects effects_;
-  std::chrono::milliseconds now_{0};
-};
-
-TEST_F(ServicesMovedTest, WhoHasReadItsEventsIsToldNothing) {
-  EXPECT_THAT(services_.untold_moves(kViewer), IsEmpty());
-  advertise(5);
-  subscribe();
-  EXPECT_THAT(services_.untold_moves(kViewer), IsEmpty()) << "the answer told";
-  advertise(6);
-  EXPECT_EQ(services_.untold_moves(kViewer).size(), 1u);
-  services_.moves_read(kViewer, last_move() - 1);
-  EXPECT_EQ(services_.untold_moves(kViewer).size(), 1u);
-  services_.moves_read(kViewer, last_move());
-  EXPECT_THAT(services_.untold_moves(kViewer), IsEmpty());
-  services_.moves_read(kOther, last_move());
+TEST_F(ServicesTest, OtherTermsMeanAnotherGroupThatSubscribersAreToldFirst) {
+  advertise(kRobot, "robot/odom");
+  subscribe(kViewer, "robot/odom");
+  take_words();
+  ServiceTerms terms = odometry();
+  terms.message_type = 99;
+  EXPECT_EQ(advertise(kRobot, "robot/odom", terms), GroupIndex{2});
+  EXPECT_THAT(take_words(), ElementsAre("group 1", "moved robot/odom", "group 2"));
+  EXPECT_EQ(services_.find_group(GroupIndex{1}), nullptr);
+  EXPECT_EQ(services_.services_of(kRobot), 1u);
 }
 
-TEST_F(ServicesMovedTest, SeveralMovesAreToldAsOneWithWhatIsTrueNow) {
-  const GroupIndex known = advertise(5);
-  subscribe();
-  const GroupIndex between = advertise(6);
-  EXPECT_EQ(services_.withdraw(kRobot, between, now_, effects_), std::nullopt);
-  const GroupIndex present = advertise(7);
-  const ServiceMovedDue event = told();
-  EXPECT_THAT(event.subscribers, ElementsAre(kViewer));
-  EXPECT_EQ(event.full_name, "robot/odom");
-  EXPECT_EQ(event.old_group, known);
-  EXPECT_EQ(event.new_group, present);
-  EXPECT_THAT(event.between, ElementsAre(between));
-  EXPECT_EQ(event.message_type, 7u);
-  EXPECT_EQ(event.window, 3u);
-  EXPECT_EQ(event.move, last_move());
-  EXPECT_TRUE(event.again);
+TEST_F(ServicesTest, WithdrawingTellsSubscribersAndKeepsThemWaiting) {
+  advertise(kRobot, "robot/odom");
+  subscribe(kViewer, "robot/odom");
+  take_words();
+  EXPECT_FALSE(services_.withdraw(kRobot, GroupIndex{1}, now_, effects_));
+  EXPECT_THAT(take_words(), ElementsAre("provider of 1", "moved robot/odom"));
+  EXPECT_FALSE(services_.find_group(GroupIndex{1})->provided());
+  EXPECT_EQ(services_.provided(), 0u);
+  EXPECT_EQ(services_.withdraw(kRobot, GroupIndex{1}, now_, effects_)->status, Status::not_found);
+  // The same terms by anybody: the same group.
+  EXPECT_EQ(advertise(kLogger, "robot/odom"), GroupIndex{1});
+  EXPECT_THAT(take_words(), ElementsAre("provider of 1", "moved robot/odom"));
+  EXPECT_FALSE(services_.withdraw(kLogger, GroupIndex{1}, now_, effects_));
+  take_words();
+  ServiceTerms terms = odometry();
+  terms.retain = true;
+  EXPECT_EQ(advertise(kRobot, "robot/odom", terms), GroupIndex{2});
+  EXPECT_THAT(take_words(),
+              ElementsAre("group 1", "moved robot/odom", "group 2", "pace 2 of 2: 0/1 retained"));
 }
 
-TEST_F(ServicesMovedTest, AServiceThatIsGoneIsToldAsGone) {
-  const GroupIndex known = advertise(5);
-  subscribe();
-  EXPECT_EQ(services_.withdraw(kRobot, known, now_, effects_), std::nullopt);
-  EXPECT_EQ(told().old_group, known);
-  EXPECT_EQ(told().new_group, kNoGroup);
-  EXPECT_EQ(told().window, 0u);
+TEST_F(ServicesTest, AGroupThatNobodyUsesIsGivenBackAfterAGraceTime) {
+  const milliseconds grace{limits_.grace_ms};
+  advertise(kRobot, "robot/odom");
+  EXPECT_FALSE(services_.withdraw(kRobot, GroupIndex{1}, now_, effects_));
+  EXPECT_EQ(services_.next_deadline(), now_ + grace);
+  subscribe(kViewer, "robot/odom");
+  services_.tick(now_ + grace, effects_);
+  EXPECT_NE(services_.find_group(GroupIndex{1}), nullptr) << "somebody waits for it";
+  now_ += grace;
+  EXPECT_FALSE(services_.unsubscribe(kViewer, "robot/odom", now_, effects_));
+  services_.tick(now_ + grace - 1ms, effects_);
+  EXPECT_NE(services_.find_group(GroupIndex{1}), nullptr);
+  take_words();
+  services_.tick(now_ + grace, effects_);
+  EXPECT_THAT(take_words(), ElementsAre("group 1"));
+  EXPECT_EQ(services_.topics(), 0u);
+  EXPECT_EQ(services_.next_deadline(), std::nullopt);
+  EXPECT_EQ(advertise(kRobot, "robot/odom"), GroupIndex{2}) << "the id rests";
 }
 
-TEST_F(ServicesMovedTest, AnIdThatIsAnotherServicesNowIsNotTakenFromThat) {
-  const GroupIndex known = advertise(5);
-  subscribe();
-  const GroupIndex between = advertise(6);
-  advertise(7);
-  now_ += std::chrono::hours{1};  // long enough at rest
-  EXPECT_EQ(advertise(5, "robot/laser", known), known);
-  EXPECT_EQ(advertise(5, "robot/scan", between), between);
-  EXPECT_EQ(told().old_group, kNoGroup);
-  EXPECT_THAT(told().between, IsEmpty());
+TEST_F(ServicesTest, TheOldestGroupsThatNobodyProvidesMakeRoomWhereFewAreLeft) {
+  limits_.services_per_node = limits_.subscriptions_per_node = 2'000'000;
+  constexpr std::uint32_t kHeldMost = kIndexMost / 4 * 3;
+  for (std::uint32_t i = 1; i <= kHeldMost; ++i)
+    ASSERT_EQ(advertise(kRobot, "robot/s" + std::to_string(i)), GroupIndex{i});
+  subscribe(kViewer, "robot/s7");
+  EXPECT_FALSE(services_.withdraw(kRobot, GroupIndex{7}, now_, effects_));
+  EXPECT_FALSE(services_.withdraw(kRobot, GroupIndex{5}, now_, effects_));
+  take_words();
+  EXPECT_EQ(advertise(kLogger, "logger/one"), GroupIndex{kHeldMost + 1});
+  EXPECT_THAT(take_words(),
+              ElementsAre("group 7", "moved robot/s7", "group " + std::to_string(kHeldMost + 1)));
+  EXPECT_FALSE(services_.find("robot/s7")->service) << "its subscription stays";
+  EXPECT_NE(services_.find_group(GroupIndex{5}), nullptr);
+  // A name that makes room for itself.
+  ServiceTerms terms = odometry();
+  terms.instance = 99;
+  EXPECT_EQ(advertise(kRobot, "robot/s5", terms), GroupIndex{kHeldMost + 2});
 }
 
-TEST_F(ServicesMovedTest, AServiceThatHasItsFormerGroupAgainIsThere) {
-  const GroupIndex known = advertise(5);
-  subscribe();
-  EXPECT_EQ(services_.withdraw(kRobot, known, now_, effects_), std::nullopt);
-  now_ += std::chrono::hours{1};
-  EXPECT_EQ(advertise(5, "robot/odom", known), known);
-  EXPECT_EQ(told().old_group, kNoGroup);
-  EXPECT_EQ(told().new_group, known);
+TEST_F(ServicesTest, WhoComesBackIsToldOfWhatChangedSince) {
+  advertise(kRobot, "robot/odom");
+  advertise(kRobot, "robot/scan");
+  subscribe(kViewer, "robot/odom");
+  subscribe(kViewer, "robot/scan");
+  const std::uint64_t before = services_.changes();
+  EXPECT_THAT(services_.moved_since(kViewer, before), IsEmpty());
+  EXPECT_FALSE(services_.withdraw(kRobot, GroupIndex{2}, now_, effects_));
+  EXPECT_FALSE(services_.withdraw(kRobot, GroupIndex{1}, now_, effects_));
+  advertise(kRobot, "robot/scan");
+  const auto moved = services_.moved_since(kViewer, before);
+  ASSERT_EQ(moved.size(), 2u) << "each once, the latest last";
+  EXPECT_EQ(moved[0]->full_name, "robot/odom");
+  EXPECT_EQ(moved[1]->full_name, "robot/scan");
+  EXPECT_EQ(services_.moved_since(kViewer, moved[0]->change).size(), 1u);
+  EXPECT_THAT(services_.moved_since(kLogger, 0), IsEmpty());
 }
 
-TEST_F(ServicesMovedTest, GoesWithTheSubscriptionAndWithTheNode) {
-  advertise(5);
-  subscribe();
-  advertise(6);
-  services_.node_renumbered(kViewer, kOther, effects_);
-  EXPECT_THAT(services_.untold_moves(kViewer), IsEmpty());
-  EXPECT_THAT(told(kOther).subscribers, ElementsAre(kOther));
-  EXPECT_EQ(services_.unsubscribe(kOther, "robot/odom", effects_), std::nullopt);
-  EXPECT_TRUE(services_.subscribe(kOther, "robot/odom", {}, effects_));
-  EXPECT_THAT(services_.untold_moves(kOther), IsEmpty()) << "the answer told";
+ServiceTerms map_in_sync() {
+  ServiceTerms terms;
+  terms.delivery = proto::ns::Delivery::sync;
+  terms.window = 4;
+  terms.retain = true;
+  return terms;
 }
 
-TEST_F(ServicesMovedTest, ASubscriptionThatIsDeclaredAgainDoesNotProveThatTheEventWasRead) {
-  const GroupIndex known = advertise(5);
-  subscribe();
-  advertise(6);
-  services_.node_returned(kViewer);
-  subscribe();
-  EXPECT_EQ(told().old_group, known) << "its answer may be lost with this connection, too";
+TEST_F(ServicesTest, AGroupIsPublishedBeforeItsMembersArePaced) {
+  const SubscriberTerms wanted{.window = 2, .depth = 3};
+  EXPECT_TRUE(services_.subscribe(kViewer, "robot/map", wanted, effects_));
+  EXPECT_THAT(take_words(), IsEmpty()) << "nobody provides it yet";
+  EXPECT_EQ(advertise(kRobot, "robot/map", map_in_sync()), GroupIndex{1});
+  EXPECT_THAT(take_words(), ElementsAre("moved robot/map", "group 1", "pace 2 of 1: 2/3 retained"));
+  EXPECT_EQ(subscribe(kLogger, "robot/map"), Status::done);
+  EXPECT_THAT(take_words(),
+              ElementsAre("member 3 of 1", "pace 3 of 1: 4/1 retained", "subscribers robot/map"));
+  EXPECT_TRUE(services_.subscribe(kViewer, "robot/map", wanted, effects_));
+  EXPECT_THAT(take_words(), IsEmpty()) << "declared again, the same";
+  EXPECT_TRUE(services_.subscribe(kViewer, "robot/map", {.window = 9}, effects_));
+  EXPECT_THAT(take_words(), ElementsAre("pace 2 of 1: 4/1 retained"))
+      << "at most what the service allows";
+  EXPECT_FALSE(services_.unsubscribe(kLogger, "robot/map", now_, effects_));
+  EXPECT_THAT(take_words(),
+              ElementsAre("member 3 of 1", "no pace 3 of 1", "subscribers robot/map"));
+  // In the table first: a frame that is read before the last message is forgotten must not make it
+  // anew.
+  EXPECT_EQ(advertise(kRobot, "robot/map"), GroupIndex{2});
+  EXPECT_THAT(take_words(), ElementsAre("no pace 2 of 1", "group 1", "forget 1 of 1",
+                                        "moved robot/map", "group 2"));
+  EXPECT_EQ(advertise(kRobot, "robot/map", map_in_sync()), GroupIndex{3});
+  EXPECT_THAT(take_words(),
+              ElementsAre("group 2", "moved robot/map", "group 3", "pace 2 of 3: 4/1 retained"));
+  EXPECT_FALSE(services_.withdraw(kRobot, GroupIndex{3}, now_, effects_));
+  EXPECT_THAT(take_words(), ElementsAre("provider of 3", "forget 3 of 1", "moved robot/map"));
 }
 
 }  // namespace

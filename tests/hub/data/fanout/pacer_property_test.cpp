@@ -193,7 +193,7 @@ class Pair {
     // Not that of the fragments: one that is given up makes room for what is held, once all of the
     // run is.
     burst.frame.lane = below(8) == 0 ? 3 : 1;
-    burst.frame.src = 1 + below(2);
+    burst.frame.src = 1;  // of another one a run gives up what is coming as its first frame does
     if (below(2) == 0) burst.frame.flags |= proto::kFlagReport;
     const std::uint32_t base = below(8) == 0 ? below(1'500) : below(30);
     const std::uint32_t spread = below(2) == 0 ? 1 : 1 + below(below(4) == 0 ? 1'200 : 30);
@@ -221,8 +221,9 @@ class Pair {
   void credit() {
     const std::uint64_t total =
         whole_.taken - below(2) * std::min<std::uint64_t>(whole_.taken, below(3));
-    both(
-        [&](Side& side) { std::ignore = side.rig.pacer.on_credit(side.recipient, kGroup, total); });
+    both([&](Side& side) {
+      std::ignore = side.rig.pacer.on_credit(side.recipient, {kGroup, total});
+    });
   }
   void pass_time() {
     const std::uint64_t ms = below(4) == 0 ? 1'000 : below(12);

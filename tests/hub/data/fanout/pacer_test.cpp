@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "tests/hub/data/support/route_rig.hpp"
+#include "tests/hub/data/support/pacer_rig.hpp"
 
 namespace gimnet::hub {
 namespace {
@@ -11,82 +11,20 @@ namespace {
 using proto::DropReason;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
-using testing::RouteRig;
-using testing::TestFrame;
-
-constexpr GroupId kGroup{7u << 20 | 5};
-constexpr std::uint64_t kStartMs = 1'000'000;
-
-class PacerTest : public ::testing::Test {
- protected:
-  PacerTest() { rig.egress.context.now_ms = kStartMs; }
-  void TearDown() override { EXPECT_TRUE(rig.ledger_exact()); }
-
-  PacedSubscription& subscribe(const PaceTerms& terms) {
-    return rig.pacer.subscribe(recipient, kGroup, terms);
-  }
-  void offer(PacedSubscription& subscription, const std::vector<std::string>& texts,
-             std::uint8_t lane = 1, std::uint8_t flags = 0) {
-    const TestFrame frame{.kind = proto::Kind::group, .flags = flags, .lane = lane};
-    const hub::Run run = rig.make_run(kGroup.value(), texts, frame);
-    rig.pacer.begin_run(run, testing::last_bytes_of(run));
-    EXPECT_TRUE(rig.pacer.offer(subscription, run, run.header(), {}));
-  }
-  hub::Run fragment(std::uint32_t number, std::uint32_t offset, std::uint32_t total,
-                    const std::string& text, std::uint8_t lane) {
-    std::string all(proto::kFragmentHeaderSize, '\0');
-    proto::store_fragment_header(reinterpret_cast<std::byte*>(all.data()), {number, offset, total});
-    const TestFrame frame{.kind = proto::Kind::group, .flags = proto::kFlagFragment, .lane = lane};
-    return rig.make_run(kGroup.value(), {all + text}, frame);
-  }
-  void offer_fragment(PacedSubscription& subscription, std::uint32_t number, std::uint32_t offset,
-                      std::uint32_t total, const std::string& text, std::uint8_t lane = 1) {
-    const hub::Run run = fragment(number, offset, total, text, lane);
-    EXPECT_TRUE(rig.pacer.offer(subscription, run, run.header(), {}));
-  }
-  /// What went into the outbox since the last call.
-  std::vector<std::string> sent() {
-    std::vector<std::string> texts;
-    for (std::size_t lane = 0; lane < proto::kLaneCount; ++lane) {
-      LaneQueue& queue = recipient.outbox.lane(lane);
-      while (!queue.empty()) {
-        Entry& entry = queue.front();
-        do {
-          for (hub::Run rest = entry.run.share(); rest.frames != 0; rest.skip_frame()) {
-            std::size_t skip = proto::kHeaderSize;
-            if (rest.header().has(proto::kFlagFragment)) skip += proto::kFragmentHeaderSize;
-            texts.emplace_back(reinterpret_cast<const char*>(rest.bytes) + skip,
-                               rest.header().frame_size() - skip);
-          }
-        } while (entry.next_piece());
-        rig.egress.tally.queued -= entry.frames;
-        rig.egress.tally.delivered += entry.frames;
-        queue.on_left(entry, entry.size);
-        queue.pop_front();
-      }
-    }
-    return texts;
-  }
-  void pass_ms(std::uint64_t ms) {
-    rig.egress.context.now_ms += ms;
-    rig.pacer.release_due();
-  }
-  std::uint64_t dropped(DropReason reason) { return rig.egress.dropped(reason); }
-
-  RouteRig rig;
-  Recipient& recipient = rig.add_here(2);
-};
+using testing::kGroup;
+using testing::kStartMs;
+using testing::PacerTest;
 
 TEST_F(PacerTest, LetsThroughAWindowAndHoldsTheNewest) {
   PacedSubscription& one = subscribe({.window = 2});
   offer(one, {"1", "2", "3", "4", "5"});
   EXPECT_THAT(sent(), ElementsAre("1", "2"));
   EXPECT_EQ(dropped(DropReason::replaced), 2u);
-  EXPECT_TRUE(rig.pacer.on_credit(recipient, kGroup, 1));
+  EXPECT_TRUE(rig.pacer.on_credit(recipient, {kGroup, 1}));
   EXPECT_THAT(sent(), ElementsAre("5"));
   offer(one, {"6"});
   EXPECT_THAT(sent(), IsEmpty());
-  EXPECT_TRUE(rig.pacer.on_credit(recipient, kGroup, 3));
+  EXPECT_TRUE(rig.pacer.on_credit(recipient, {kGroup, 3}));
   EXPECT_THAT(sent(), ElementsAre("6"));
   offer(one, {"7"});
   EXPECT_THAT(sent(), ElementsAre("7"));
@@ -97,7 +35,7 @@ TEST_F(PacerTest, HoldsTheNewestOfItsDepthInOrder) {
   offer(one, {"1", "2", "3", "4", "5"});
   EXPECT_THAT(sent(), ElementsAre("1"));
   for (std::uint64_t total = 1; total <= 3; ++total) {
-    EXPECT_TRUE(rig.pacer.on_credit(recipient, kGroup, total));
+    EXPECT_TRUE(rig.pacer.on_credit(recipient, {kGroup, total}));
     EXPECT_THAT(sent(), ElementsAre(std::to_string(total + 2)));
   }
   subscribe({.window = 1, .depth = 3});
@@ -181,7 +119,7 @@ TEST_F(PacerTest, ARateBehindNoneDoesNotRememberTheOneBefore) {
 
 TEST_F(PacerTest, ASubscriptionThatBeginsAgainIsDueAtOnce) {
   offer(subscribe({.interval_us = 1'000'000'000}), {"1", "2"});
-  rig.pacer.unsubscribe(recipient, kGroup, false);
+  rig.pacer.unsubscribe(recipient, kGroup);
   EXPECT_EQ(rig.pacer.next_due_ms(), Pacer::kNever);
   PacedSubscription& again = subscribe({.interval_us = 1'000'000'000});
   offer(again, {"3", "4"});
@@ -216,13 +154,13 @@ TEST_F(PacerTest, WholeMessagesOfManyFragmentsCountOnce) {
   EXPECT_THAT(sent(), ElementsAre("cd"));
   offer_fragment(one, 2, 0, 4, "ef");
   EXPECT_THAT(sent(), IsEmpty());
-  EXPECT_TRUE(rig.pacer.on_credit(recipient, kGroup, 1));
+  EXPECT_TRUE(rig.pacer.on_credit(recipient, {kGroup, 1}));
   EXPECT_THAT(sent(), ElementsAre("ef")) << "what has come of it goes, and the rest as it comes";
   offer_fragment(one, 2, 2, 4, "gh");
   EXPECT_THAT(sent(), ElementsAre("gh"));
   offer_fragment(one, 3, 0, 4, "ij");
   offer_fragment(one, 3, 2, 4, "kl");
-  EXPECT_TRUE(rig.pacer.on_credit(recipient, kGroup, 2));
+  EXPECT_TRUE(rig.pacer.on_credit(recipient, {kGroup, 2}));
   EXPECT_THAT(sent(), ElementsAre("ij", "kl"));
 }
 
@@ -235,7 +173,7 @@ TEST_F(PacerTest, AMessageThatIsStillComingDoesNotReplaceAWholeOne) {
   EXPECT_EQ(dropped(DropReason::cut_message), 1u);
   offer_fragment(one, 9, 2, 4, "cd");
   EXPECT_EQ(dropped(DropReason::cut_message), 2u) << "the rest of it";
-  EXPECT_TRUE(rig.pacer.on_credit(recipient, kGroup, 1));
+  EXPECT_TRUE(rig.pacer.on_credit(recipient, {kGroup, 1}));
   EXPECT_THAT(sent(), ElementsAre("3"));
 }
 
@@ -244,7 +182,7 @@ TEST_F(PacerTest, AMessageWithoutAnEndGivesItsPlaceBack) {
   offer_fragment(one, 1, 0, 4, "ab");
   offer(one, {"next"});
   EXPECT_THAT(sent(), ElementsAre("ab", "next")) << "of the same lane: the next message shows it";
-  EXPECT_TRUE(rig.pacer.on_credit(recipient, kGroup, 1));
+  EXPECT_TRUE(rig.pacer.on_credit(recipient, {kGroup, 1}));
   offer_fragment(one, 2, 0, 4, "cd", 2);
   offer(one, {"other"});
   EXPECT_THAT(sent(), ElementsAre("cd"));
@@ -273,29 +211,10 @@ TEST_F(PacerTest, AMessageThatBeganBeforeThePaceIsNotCut) {
   // New terms change nothing, and another beginning of the subscription is none of the pace.
   rig.pacer.subscribe(recipient, kGroup, {.interval_us = 10'000}, true);
   offer_fragment(one, 6, 2, 4, "op");
-  rig.pacer.unsubscribe(recipient, kGroup, false);
+  rig.pacer.unsubscribe(recipient, kGroup);
   PacedSubscription& anew = subscribe({.interval_us = 10'000});
   offer_fragment(anew, 7, 2, 4, "qr");
   EXPECT_EQ(dropped(DropReason::cut_message), 6u);
-}
-
-TEST_F(PacerTest, WhatTheOutboxDropsCountsAsTaken) {
-  PacedSubscription& one = subscribe({.window = 2});
-  offer(one, {"1", "2", "3"});
-  recipient.outbox.drop_all(DropReason::link_lost, rig.egress.context);
-  EXPECT_EQ(one.uncredited(), 0u);
-  EXPECT_EQ(rig.pacer.next_due_ms(), 0u);
-  rig.pacer.release_due();
-  EXPECT_THAT(sent(), ElementsAre("3"));
-}
-
-TEST_F(PacerTest, WhatIsTooLargeForTheSubscriberIsNotWaitedFor) {
-  recipient.frame_bytes = 100;
-  PacedSubscription& one = subscribe({.window = 1});
-  offer(one, {std::string(101, 'x')});
-  rig.pacer.release_due();
-  EXPECT_EQ(dropped(DropReason::too_large), 1u);
-  EXPECT_EQ(one.space(), 1u);
 }
 
 TEST_F(PacerTest, HoldsWithinTheLaneAndTheBudget) {
@@ -349,7 +268,7 @@ TEST_F(PacerTest, OfALongRunOnlyWhatStaysIsCopied) {
     EXPECT_EQ(rig.egress.tally.copied_bytes - copied, depth * (proto::kHeaderSize + 4));
     subscribe({.window = 3, .depth = depth});
     EXPECT_EQ(sent().size(), 1 + depth);
-    rig.pacer.unsubscribe(recipient, kGroup, true);
+    rig.pacer.unsubscribe(recipient, kGroup);
   }
   EXPECT_EQ(dropped(DropReason::replaced), 999u + 998u);
 }
@@ -380,20 +299,6 @@ TEST_F(PacerTest, ForASubscriberThatIsAway) {
   rig.pacer.on_new_epoch(recipient);
   offer(one, {"4", "5"});
   EXPECT_THAT(sent(), ElementsAre("4"));
-}
-
-TEST_F(PacerTest, CountsGoOnWhenASubscriptionBeginsAgain) {
-  PacedSubscription& one = subscribe({.window = 2});
-  offer(one, {"1", "2", "3"});
-  rig.pacer.unsubscribe(recipient, kGroup, false);
-  EXPECT_EQ(Pacer::find(recipient, kGroup), nullptr);
-  EXPECT_EQ(dropped(DropReason::no_subscriber), 1u);
-  EXPECT_TRUE(rig.pacer.on_credit(recipient, kGroup, 1)) << "they are still on their way";
-  PacedSubscription& again = subscribe({.window = 2});
-  offer(again, {"4", "5"});
-  EXPECT_THAT(sent(), ElementsAre("1", "2", "4"));
-  rig.pacer.unsubscribe(recipient, kGroup, true);
-  EXPECT_FALSE(rig.pacer.on_credit(recipient, kGroup, 3)) << "nobody knows that group";
 }
 
 }  // namespace

@@ -62,7 +62,7 @@ class RetainedBudgetTest : public ::testing::Test {
   }
   void forget(std::uint32_t group) {
     rig.withdraw_group(group);
-    rig.command(0, ForgetRetainedCommand{GroupId{HubRig::group(group)}});
+    rig.command(0, ForgetRetainedCommand{GroupId{HubRig::group(group)}, providers.at(group)->id});
     rig.turn();
   }
 

@@ -40,9 +40,13 @@ class RetainedMessagesTest : public ::testing::Test {
     rig.turn();
   }
   FakeNode& subscriber(std::size_t shard, const PaceTerms& terms = {}) {
+    return subscriber_of(provider, shard, terms);
+  }
+  FakeNode& subscriber_of(const FakeNode& provides, std::size_t shard,
+                          const PaceTerms& terms = {}) {
     FakeNode& node = rig.join(shard);
     members.push_back(&node);
-    rig.publish_paced_group(1, provider.id, members, true);
+    rig.publish_paced_group(1, provides.id, members, true);
     rig.pace(node, 1, terms, true);
     return node;
   }
@@ -144,19 +148,13 @@ TEST_F(RetainedMessagesTest, IsGivenWhileTheProviderIsRenumbered) {
   EXPECT_EQ(got(late), (Texts{"1"}));
 }
 
-// Counts of ended subscriptions are let go where there are too many.
 TEST_F(RetainedMessagesTest, AStartUnderWayIsNotTakenForALaterSubscriptions) {
   FakeNode& node = rig.join(1);
-  for (std::uint32_t group = 100; group < 1'200; ++group) {
-    rig.pace(node, group, {});
-    rig.command(1, EndPaceCommand{node.session, GroupId{HubRig::group(group)}, false});
-  }
-  rig.settle();
   publish("1");
   members.push_back(&node);
   rig.publish_paced_group(1, provider.id, members, true);
   rig.pace(node, 1, {}, true);
-  rig.command(1, EndPaceCommand{node.session, GroupId{HubRig::group(1)}, false});
+  rig.command(1, EndPaceCommand{node.session, GroupId{HubRig::group(1)}});
   rig.pace(node, 1, {}, true);
   rig.turn_shard(1);
   EXPECT_EQ(got(node), (Texts{"1"}));
@@ -169,8 +167,8 @@ TEST_F(RetainedMessagesTest, AStartUnderWayIsNotTakenForALaterGroupsOfThatId) {
   rig.turn_shard(1);
   rig.turn_shard(0);
   rig.withdraw_group(1);
-  rig.command(0, ForgetRetainedCommand{GroupId{HubRig::group(1)}});
-  rig.command(1, EndPaceCommand{node.session, GroupId{HubRig::group(1)}, true});
+  rig.command(0, ForgetRetainedCommand{GroupId{HubRig::group(1)}, provider.id});
+  rig.command(1, EndPaceCommand{node.session, GroupId{HubRig::group(1)}});
   rig.publish_paced_group(1, provider.id, members, true);
   rig.pace(node, 1, {}, true);
   rig.send(provider, HubRig::group(1), "new", {.kind = Kind::group});
@@ -178,12 +176,57 @@ TEST_F(RetainedMessagesTest, AStartUnderWayIsNotTakenForALaterGroupsOfThatId) {
   EXPECT_EQ(got(node), (Texts{"new"}));
 }
 
+// The new provider lives on the same shard or on another one, and has said something or nothing.
+TEST_F(RetainedMessagesTest, AStartIsAskedForAgainWhereTheProviderChangedMeanwhile) {
+  publish("of the former provider");
+  for (const std::size_t shard : {0u, 1u}) {
+    FakeNode& next = rig.join(shard);
+    FakeNode& node = subscriber(1);
+    rig.turn_shard(1);  // asks the former provider's shard
+    rig.turn_shard(0);
+    rig.publish_paced_group(1, next.id, members, true);
+    EXPECT_EQ(got(node), Texts{}) << "the next provider has said nothing";
+    rig.command(0, ForgetRetainedCommand{GroupId{HubRig::group(1)}, provider.id});
+    rig.send(next, HubRig::group(1), "next", {.kind = Kind::group});
+    EXPECT_EQ(got(node), Texts{"next"});
+    FakeNode& late = subscriber_of(next, 0);
+    EXPECT_EQ(got(late), Texts{"next"}) << "the former one's shard forgot its own message only";
+    rig.publish_paced_group(1, provider.id, members, true);
+    publish("of the former provider");
+  }
+}
+
+TEST_F(RetainedMessagesTest, ASubscriptionIsOpenAtOnceWhereNobodyProvides) {
+  publish("last");
+  rig.publish_paced_group(1, NodeId{}, members, true);
+  FakeNode& node = rig.join(1);
+  members.push_back(&node);
+  rig.publish_paced_group(1, NodeId{}, members, true);
+  rig.pace(node, 1, {}, true);
+  EXPECT_EQ(got(node), Texts{});
+  rig.publish_paced_group(1, provider.id, members, true);
+  publish("next");
+  EXPECT_EQ(got(node), Texts{"next"});
+}
+
+TEST_F(RetainedMessagesTest, IsFromTheIdThatItsProviderHasNow) {
+  publish("last");
+  rig.renumber(provider, 400);
+  rig.settle();
+  rig.publish_paced_group(1, provider.id, members, true);
+  FakeNode& late = subscriber(1);
+  rig.settle();
+  ASSERT_EQ(late.frames.size(), 1u);
+  EXPECT_EQ(late.frames[0].text(), "last");
+  EXPECT_EQ(late.frames[0].header.src, provider.id.value());
+}
+
 TEST_F(RetainedMessagesTest, IsFreedWithItsServiceAndPinsNothing) {
   publish(std::string(5'000, 'x'));
   rig.turn();
   EXPECT_EQ(rig.sum(&ShardCounters::pinned_bytes), 0u) << "it has a budget of its own";
   rig.withdraw_group(1);
-  rig.command(0, ForgetRetainedCommand{GroupId{HubRig::group(1)}});
+  rig.command(0, ForgetRetainedCommand{GroupId{HubRig::group(1)}, provider.id});
   rig.turn();
   EXPECT_EQ(rig.state(0).retained.groups(), 0u);
 }
@@ -230,8 +273,10 @@ TEST(RetainedMessages, KeepsNothingOfAProviderThatLeft) {
     const std::uint32_t provider = newest - below(20);
     switch (below(8)) {
       case 0:
-        rig.retained.forget(GroupId{HubRig::group(group)});
-        provider_of.erase(group);
+        rig.retained.forget(GroupId{HubRig::group(group)}, node(provider));
+        std::erase_if(provider_of, [&](const auto& each) {
+          return each.first == group && each.second == provider;
+        });
         break;
       case 1:
         rig.retained.forget_provider(node(provider));
@@ -286,7 +331,7 @@ TEST_F(RetainedMessagesTest, IsACopyThatIsDroppedWhereTheSubscriberIsGone) {
     const std::uint64_t copies = rig.ledger().copies;
     rig.pace(node, 1, {}, true);
     rig.turn_shard(shard);  // asks the provider's shard
-    rig.command(shard, EndPaceCommand{node.session, GroupId{HubRig::group(1)}, false});
+    rig.command(shard, EndPaceCommand{node.session, GroupId{HubRig::group(1)}});
     EXPECT_EQ(got(node), shard == 0 ? Texts{"one"} : Texts{})
         << "on the provider's own shard it waits for nothing";
     EXPECT_EQ(rig.ledger().copies, copies + 1);

@@ -146,7 +146,6 @@ void HubRig::attach(FakeNode& node, const JoinSpec& spec, bool new_session) {
   command.peer_resume_bytes = spec.resume_bytes;
   command.peer_frame_bytes = spec.frame_bytes;
   command.told.assign(spec.told.begin(), spec.told.end());
-  command.told_move = spec.told_move;
   node.welcome.reset();
   node.goodbye.reset();
   this->command(node.shard.value(), std::move(command));

@@ -41,7 +41,6 @@ struct JoinSpec {
   std::uint32_t frame_bytes = proto::kFrameLengthDefault;
   std::uint32_t resume_bytes = 1u << 20;
   std::span<const std::byte> told{};  ///< control frames that it gets first
-  std::uint64_t told_move = 0;
 };
 
 /// A node played by a test: the far end of its connection, and what came out of it.
