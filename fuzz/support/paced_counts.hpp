@@ -11,8 +11,8 @@
 
 namespace gimnet::fuzz {
 
-/// What a subscriber of a paced group counts, as its library would. Ends in an abort where it gets
-/// more than its window, or a message out of order or twice.
+/// The counts of a subscriber of a paced group, as its library has them. Ends in an abort where it
+/// gets a message out of order or twice.
 class PacedCounts {
  public:
   /// Stands before the sequence number in the messages of which the order is known.
@@ -22,24 +22,12 @@ class PacedCounts {
     std::uint64_t sequence = 0;
   };
 
-  /// A subscription began or has another window; 0: none.
-  void set_window(std::uint64_t window) {
-    window_most_ = window == 0 ? kNoWindow : std::max(window_most_, window);
-  }
   /// The last message may come again, as far as up to this one.
   void allow_repeats(std::uint64_t up_to) { repeats_up_to_ = up_to; }
   /// The group is another one.
-  void begin(std::uint64_t window) {
-    *this = PacedCounts{};
-    set_window(window);
-  }
+  void begin() { *this = PacedCounts{}; }
   /// The counts of this connection begin at 0.
-  void begin_epoch(std::uint64_t window) {
-    ended_ = credited_ = window_most_ = 0;
-    set_window(window);
-  }
-  /// Said more than there was: what its hub makes of that need not be what it counts.
-  void lied() { window_most_ = kNoWindow; }
+  void begin_epoch() { ended_ = credited_ = 0; }
   [[nodiscard]] std::uint64_t credit(std::uint64_t messages) {
     credited_ = std::min(ended_, credited_ + messages);
     return credited_;
@@ -48,7 +36,7 @@ class PacedCounts {
   void take(const proto::FrameView& frame) {
     if (frame.header.has(proto::kFlagFragment) && !frame.ends_message()) return;
     ++ended_;
-    FUZZ_MUST(window_most_ == kNoWindow || ended_ - credited_ <= window_most_);
+    ++taken_;
     const bool whole = !frame.header.has(proto::kFlagFragment);
     const std::span<const std::byte> payload = frame.payload;
     Message message;
@@ -61,14 +49,14 @@ class PacedCounts {
     last_ = message.sequence;
   }
 
-  [[nodiscard]] std::uint64_t ended() const { return ended_; }
+  /// Messages of the group, whatever they count in.
+  [[nodiscard]] std::uint64_t taken() const { return taken_; }
   [[nodiscard]] std::uint64_t last() const { return last_; }
 
  private:
-  static constexpr std::uint64_t kNoWindow = UINT64_MAX;
-  std::uint64_t window_most_ = 0;
   std::uint64_t ended_ = 0;     ///< messages of this epoch
   std::uint64_t credited_ = 0;  ///< of them
+  std::uint64_t taken_ = 0;
   std::uint64_t last_ = 0;
   std::uint64_t repeats_up_to_ = 0;
 };

@@ -121,11 +121,16 @@ class ShardWorld {
   virtual void on_group_frame(const proto::FrameView&) {}
   /// The counts of the node's data frames begin at 0.
   virtual void on_new_epoch(const Node&) {}
+  /// A connection of the node begins; all that could be read of the former one was read.
+  virtual void on_attach(const Node&) {}
+  /// Its WELCOME came.
+  virtual void on_welcome(const Node&) {}
   /// An answer came to the node.
   virtual void on_answer(const Node&) {}
 
   void attach(Node& node, bool new_session) {
     if (!new_session) read(node);
+    on_attach(node);
     auto [transport, peer] = make_memory_pipe();
     node.pipe = std::move(peer);
     node.stream.clear();
@@ -202,6 +207,7 @@ class ShardWorld {
         if (!welcome->resumed) node.taken = 0;
         if (!welcome->resumed) on_new_epoch(node);
         node.hub_epoch = welcome->epoch;
+        on_welcome(node);
       }
       if (header.kind == proto::Kind::ns) on_answer(node);
       return;
