@@ -5,12 +5,16 @@
 #include <string>
 
 #include "base/ids.hpp"
+#include "proto/control/hub_identity.hpp"
 
 namespace gimnet::hub {
 
 /// Who this hub is. Thread safety: immutable after start-up.
 struct HubFacts {
   HubId id{1};
+  bool id_configured = false;   ///< and not drawn, nor the default
+  proto::UniqueId unique;       ///< of its state folder; all 0: it has none yet
+  proto::HubInstance instance;  ///< of this start
   std::string name;
   std::string version;
   std::size_t shards = 1;

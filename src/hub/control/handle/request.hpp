@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "hub/control/hub_facts.hpp"
+#include "hub/control/network_view.hpp"
 #include "hub/control/reloading.hpp"
 #include "hub/control/state/membership.hpp"
 #include "hub/control/state/watches.hpp"
@@ -46,6 +47,7 @@ struct HandlerContext {
   const RefusalCounters* refusals = nullptr;         ///< or none
   const RequestCounters* requests = nullptr;         ///< or none
   Administration* administration = nullptr;          ///< or none
+  NetworkView* network = nullptr;                    ///< or none: a hub alone
   std::optional<CountsBegin> counts{};               ///< what begins with the answer
 };
 
