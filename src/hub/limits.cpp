@@ -22,7 +22,7 @@ constexpr std::uint64_t kYear = 365 * 24 * kHour;
 
 constexpr std::array kTable{
     LimitInfo{"frame_bytes", "bytes", &Limits::frame_bytes, 65'536, proto::kFrameLengthMax,
-              "largest frame after its header; 64 KiB is what every hub carries"},
+              "largest frame after its header; 64 KiB is what every hub carries", false, true},
     LimitInfo{"turn_bytes", "bytes", &Limits::turn_bytes, 4 * kKiB, 16 * kMiB,
               "read from one connection before the next one has its turn", true},
     LimitInfo{"turn_deliveries", "deliveries", &Limits::turn_deliveries, 1, 16'777'216,
@@ -37,32 +37,34 @@ constexpr std::array kTable{
     LimitInfo{"handshake_bytes", "bytes", &Limits::handshake_bytes, 256, 64 * kKiB,
               "opening and HELLO together: all that a stranger may make the hub keep", true},
     LimitInfo{"handshake_ms", "ms", &Limits::handshake_ms, 10, kHour,
-              "time until HELLO must be there"},
+              "time until HELLO must be there", false, true},
     LimitInfo{"handshakes", "connections", &Limits::handshakes, 1, 1'000'000,
-              "connections without HELLO at a time; one more ends the oldest", true},
-    LimitInfo{
-        "handshakes_per_address", "connections", &Limits::handshakes_per_address, 1, 1'000'000,
-        "the same from one address; connections over loopback or a Unix socket do not count", true},
+              "connections without HELLO at a time; one more ends the oldest", true, true},
+    LimitInfo{"handshakes_per_address", "connections", &Limits::handshakes_per_address, 1,
+              1'000'000,
+              "the same from one address; connections over loopback or a Unix socket do not count",
+              true, true},
     LimitInfo{"nodes", "nodes", &Limits::nodes, 1, 1'000'000,
               "sessions, those within their grace time included; one address other than loopback, "
               "or one user other than root and the hub's own, has at most half",
-              true},
+              true, true},
     LimitInfo{"administrators", "nodes", &Limits::administrators, 0, 1'024,
-              "places beyond nodes, and descriptors, that are kept for administrators", true},
+              "places beyond nodes, and descriptors, that are kept for administrators", true, true},
     LimitInfo{"grace_ms", "ms", &Limits::grace_ms, 0, 24 * kHour,
-              "time within which a node that lost its connection gets its id and name back"},
+              "time within which a node that lost its connection gets its id and name back", false,
+              true},
     LimitInfo{
         "token_ms", "ms", &Limits::token_ms, 1'000, 10 * kYear,
         "time from its last connection for which a node's token is honoured while its id is free",
-        true},
+        true, true},
     LimitInfo{
         "kicked_tokens", "nodes", &Limits::kicked_tokens, 0, 65'536,
         "kicked nodes whose tokens a restarted hub still refuses; one more lets the oldest go",
         true},
     LimitInfo{"keep_alive_ms", "ms", &Limits::keep_alive_ms, 10, kHour,
-              "a silent end says PING after this time"},
+              "a silent end says PING after this time", false, true},
     LimitInfo{"silent_ms", "ms", &Limits::silent_ms, 30, kHour,
-              "a node that was not heard for this time is closed"},
+              "a node that was not heard for this time is closed", false, true},
     LimitInfo{
         "unacknowledged_ms", "ms", &Limits::unacknowledged_ms, 100, kHour,
         "a node over TCP that is not read, since it went on after PAUSE, and takes nothing for "
@@ -70,21 +72,21 @@ constexpr std::array kTable{
         "to no more; it ends once what it sent is taken, at most max(grace_ms, silent_ms) later",
         true},
     LimitInfo{"lane0_bytes", "bytes", &Limits::lane0_bytes, 16 * kKiB, kGiB,
-              "waiting for one node, real-time lane", true},
+              "waiting for one node, real-time lane", true, true},
     LimitInfo{"lane1_bytes", "bytes", &Limits::lane1_bytes, 16 * kKiB, kGiB,
-              "waiting for one node, normal lane", true},
+              "waiting for one node, normal lane", true, true},
     LimitInfo{"lane2_bytes", "bytes", &Limits::lane2_bytes, 16 * kKiB, kGiB,
-              "waiting for one node, bulk lane", true},
+              "waiting for one node, bulk lane", true, true},
     LimitInfo{"lane3_bytes", "bytes", &Limits::lane3_bytes, 16 * kKiB, kGiB,
-              "waiting for one node, background lane", true},
+              "waiting for one node, background lane", true, true},
     LimitInfo{"control_bytes", "bytes", &Limits::control_bytes, 16 * kKiB, kGiB,
-              "answers, events and keep-alive waiting for one node", true},
+              "answers, events and keep-alive waiting for one node", true, true},
     LimitInfo{"reserve_bytes", "bytes", &Limits::reserve_bytes, 16 * kKiB, kGiB,
               "above half of a lane, for what is under way when PAUSE is sent", true},
     LimitInfo{"budget_bytes", "bytes", &Limits::budget_bytes, 4 * kMiB, 1024 * kGiB,
-              "kept from being freed by waiting messages, the whole hub"},
+              "kept from being freed by waiting messages, the whole hub", false, true},
     LimitInfo{"lane0_bytes_per_s", "bytes/s", &Limits::lane0_bytes_per_s, kKiB, 1024 * kGiB,
-              "above this a node's real-time frames count as normal ones", true},
+              "above this a node's real-time frames count as normal ones", true, true},
     LimitInfo{"block_ms", "ms", &Limits::block_ms, 10, kHour,
               "a message sent with BLOCK is dropped when its recipient took nothing for this time"},
     LimitInfo{"slow_consumer_ms", "ms", &Limits::slow_consumer_ms, 100, kHour,
@@ -92,7 +94,7 @@ constexpr std::array kTable{
     LimitInfo{"slow_consumer_bytes", "bytes", &Limits::slow_consumer_bytes, 0, kGiB,
               "see slow_consumer_ms", true},
     LimitInfo{"resume_bytes", "bytes", &Limits::resume_bytes, 4 * kKiB, kGiB,
-              "kept for one node until it confirms them, where it asked for resume", true},
+              "kept for one node until it confirms them, where it asked for resume", true, true},
     LimitInfo{"report_interval_ms", "ms", &Limits::report_interval_ms, 1, 10'000,
               "least time between two REPORTs of one reason to one node"},
     LimitInfo{"reports", "reports", &Limits::reports, 1, 16'384,
@@ -117,7 +119,7 @@ constexpr std::array kTable{
     LimitInfo{"declarations_per_s", "declarations/s", &Limits::declarations_per_s, 1, 1'000'000,
               "names, services and subscriptions that one node may begin or change; repeating them "
               "is free",
-              true},
+              true, true},
     LimitInfo{"declarations_burst", "declarations", &Limits::declarations_burst, 1, 10'000'000,
               "the same at once; at least services_per_node and subscriptions_per_node together",
               true},
@@ -128,9 +130,9 @@ constexpr std::array kTable{
     LimitInfo{"oddities_burst", "oddities", &Limits::oddities_burst, 1, 1'000'000,
               "the same at once; one more closes the connection", true},
     LimitInfo{"services_per_node", "services", &Limits::services_per_node, 0, 1'000'000,
-              "advertised by one node", true},
+              "advertised by one node", true, true},
     LimitInfo{"subscriptions_per_node", "subscriptions", &Limits::subscriptions_per_node, 0,
-              1'000'000, "of one node, names without a service included", true},
+              1'000'000, "of one node, names without a service included", true, true},
     LimitInfo{"sync_window", "messages", &Limits::sync_window, 1, 1'000'000,
               "largest n of a service with delivery sync(n), and largest window of a subscription",
               true},
@@ -140,17 +142,19 @@ constexpr std::array kTable{
               "largest maximal rate that a subscription may ask for; time is kept in ms", true},
     LimitInfo{"retained_message_bytes", "bytes", &Limits::retained_message_bytes, 0, kGiB,
               "application data of the message that is kept for one service with retain; a larger "
-              "one is not kept. A map of 4,096 by 4,096 cells has as many"},
+              "one is not kept. A map of 4,096 by 4,096 cells has as many",
+              false, true},
     LimitInfo{"retained_budget_bytes", "bytes", &Limits::retained_budget_bytes, 0, 1024 * kGiB,
               "application data of the messages that are kept for services with retain, the whole "
-              "hub; one node may have half of it"},
+              "hub; one node may have half of it",
+              false, true},
     LimitInfo{"page_records", "records", &Limits::page_records, 1, 1'000,
               "in one answer to LIST and the like", true},
     LimitInfo{"scan_records", "records", &Limits::scan_records, 64, 1'000'000,
               "looked at for one page or one piece of watching, before others have their turn",
               true},
     LimitInfo{"watches_per_node", "watches", &Limits::watches_per_node, 0, 65'536,
-              "of names and services, by one node", true},
+              "of names and services, by one node", true, true},
     LimitInfo{"watches", "watches", &Limits::watches, 0, 1'000'000, "of all nodes together", true},
     LimitInfo{"watch_changes", "changes", &Limits::watch_changes, 1, 10'000'000,
               "kept for watches that are behind; one that is further behind gets a new snapshot",
@@ -169,15 +173,15 @@ constexpr std::array kTable{
               "always have",
               true},
     LimitInfo{"drain_ms", "ms", &Limits::drain_ms, 0, kHour,
-              "time for what waits to be written at the end", true},
+              "time for what waits to be written at the end", true, true},
     LimitInfo{"farewell_ms", "ms", &Limits::farewell_ms, 0, 60'000,
               "time for who was told GOODBYE to read it and close, before the hub does"},
     LimitInfo{"log_lines_per_s", "lines/s", &Limits::log_lines_per_s, 1, 1'000'000,
               "written to the log, twice as many at once; those that are left out are counted",
-              true},
+              true, true},
     LimitInfo{"peer_log_lines_per_s", "lines/s", &Limits::peer_log_lines_per_s, 1, 1'000'000,
               "of one kind about one peer, as many at once; those that are left out are counted",
-              true},
+              true, true},
 };
 
 std::string range_of(const LimitInfo& limit) {
@@ -230,6 +234,17 @@ std::string unit_remedy(const LimitInfo& limit, std::string_view value) {
 
 std::span<const LimitInfo> limit_table() { return kTable; }
 
+std::span<const LimitInfo* const> limit_settings() {
+  static const std::vector<const LimitInfo*> all = [] {
+    std::vector<const LimitInfo*> settings;
+    for (const LimitInfo& limit : kTable) {
+      if (limit.setting) settings.push_back(&limit);
+    }
+    return settings;
+  }();
+  return all;
+}
+
 const LimitInfo* find_limit(std::string_view name) {
   const auto* const found = std::ranges::find(kTable, name, &LimitInfo::name);
   return found == kTable.end() ? nullptr : found;
@@ -237,8 +252,7 @@ const LimitInfo* find_limit(std::string_view name) {
 
 std::string nearest_limit(std::string_view name) {
   std::vector<std::string_view> names;
-  names.reserve(kTable.size());
-  for (const LimitInfo& limit : kTable) names.push_back(limit.name);
+  for (const LimitInfo* limit : limit_settings()) names.push_back(limit->name);
   return did_you_mean(name, names);
 }
 

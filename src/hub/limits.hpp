@@ -7,9 +7,10 @@
 #include <string>
 #include <string_view>
 
-// Everything that the hub bounds, with unit, default, range and reason: the table in limits.cpp,
-// shown by `tcphub --help-limits`, and set by `tcphub --limit NAME=VALUE`, by TCPHUB_LIMITS_NAME or
-// in the configuration's [limits].
+// Everything that the hub bounds, with unit, default, range and reason: the table in limits.cpp.
+// Those that operators turn are settings: `tcphub --help-limits` shows them, and they are set by
+// `--limit NAME=VALUE`, by TCPHUB_LIMITS_NAME or in the configuration's [limits]. Tests reach all
+// others by `--limit`.
 
 namespace gimnet::hub {
 
@@ -111,14 +112,18 @@ struct LimitInfo {
   /// May it change while the hub runs? Not what memory was laid out by, nor what peers were told
   /// and rely on.
   bool reloads = false;
+  /// Do operators turn it? If not, only `--limit` reaches it.
+  bool setting = false;
 };
 
-/// All limits, in the order in which documents list them.
+/// All limits, in the order in which documents list those that are settings.
 [[nodiscard]] std::span<const LimitInfo> limit_table();
+/// The settings of the table, in its order.
+[[nodiscard]] std::span<const LimitInfo* const> limit_settings();
 
 /// nullptr: there is none of that name.
 [[nodiscard]] const LimitInfo* find_limit(std::string_view name);
-/// "; did you mean nodes?" for the limit whose name is nearest, or "".
+/// "; did you mean nodes?" for the setting whose name is nearest, or "".
 [[nodiscard]] std::string nearest_limit(std::string_view name);
 
 /// Sets one limit to a whole number, with an optional suffix k, M or G for powers of 1,024 (not for

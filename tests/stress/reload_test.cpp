@@ -57,12 +57,14 @@ class ConfigFile {
     const std::size_t odd = number % 2;
     write("[limits]\nservices_per_node = " + std::to_string(kServicesMost - odd) +
           "\nlane1_bytes = " + std::to_string((1 + odd) << 20) +
-          "\nturn_bytes = " + std::to_string(65'536 << odd) +
-          "\nnodes = " + std::to_string(50 + odd) + "\nsync_window = 1000\n");
+          "\ncontrol_bytes = " + std::to_string((1 + odd) << 18) +
+          "\nnodes = " + std::to_string(50 + odd) + "\nsubscriptions_per_node = 1000\n");
   }
   /// It would allow everything, and has a fault at its end.
   void write_bad() const {
-    write("[limits]\nservices_per_node = 1000\nnodes = 1000\nsync_window = 1000\nnods = 3\n");
+    write(
+        "[limits]\nservices_per_node = 1000\nnodes = 1000\nsubscriptions_per_node = 1000\nnods = "
+        "3\n");
   }
 
  private:

@@ -76,17 +76,15 @@ std::string help_limits() {
   std::string text =
       "Limits, set with --limit NAME=VALUE (k, M and G are powers of 1,024; times take no "
       "suffix):\n\n";
-  for (const LimitInfo& limit : limit_table()) {
-    std::string line = "  " + std::string{limit.name};
-    line.resize(std::max<std::size_t>(line.size(), 25), ' ');
-    line += std::to_string(defaults.*limit.field) + " " + std::string{limit.unit};
-    line.resize(std::max<std::size_t>(line.size(), 50), ' ');
-    text += line + " " + std::string{limit.reason} + " (" + std::to_string(limit.least) + " to " +
-            std::to_string(limit.most) + ")\n";
-  }
   std::string changing;
-  for (const LimitInfo& limit : limit_table()) {
-    if (limit.reloads) changing += (changing.empty() ? "" : ", ") + std::string{limit.name};
+  for (const LimitInfo* limit : limit_settings()) {
+    std::string line = "  " + std::string{limit->name};
+    line.resize(std::max<std::size_t>(line.size(), 25), ' ');
+    line += std::to_string(defaults.*(limit->field)) + " " + std::string{limit->unit};
+    line.resize(std::max<std::size_t>(line.size(), 50), ' ');
+    text += line + " " + std::string{limit->reason} + " (" + std::to_string(limit->least) + " to " +
+            std::to_string(limit->most) + ")\n";
+    if (limit->reloads) changing += (changing.empty() ? "" : ", ") + std::string{limit->name};
   }
   return text + "\nA reload changes: " + changing + ". The others need a restart.\n";
 }

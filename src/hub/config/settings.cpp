@@ -230,18 +230,19 @@ constexpr std::array kSettings{
 const std::vector<std::string>& all_keys() {
   static const std::vector<std::string> all = [] {
     std::vector<std::string> keys;
-    keys.reserve(std::size(kSettings) + 1 + limit_table().size());
+    keys.reserve(std::size(kSettings) + 1 + limit_settings().size());
     for (const Setting& setting : kSettings) keys.emplace_back(setting.key);
     keys.emplace_back("limits");
-    for (const LimitInfo& limit : limit_table())
-      keys.push_back(std::string{kLimits} + std::string{limit.name});
+    for (const LimitInfo* limit : limit_settings())
+      keys.push_back(std::string{kLimits} + std::string{limit->name});
     return keys;
   }();
   return all;
 }
 
 std::string nearest_key(std::string_view key) {
-  if (find_limit(key) != nullptr) return "; it is a limit: write it below [limits]";
+  if (const LimitInfo* limit = find_limit(key); limit != nullptr && limit->setting)
+    return "; it is a limit: write it below [limits]";
   static const std::vector<std::string_view> keys(all_keys().begin(), all_keys().end());
   return did_you_mean(key, keys) + " (tcphub --print-config shows all)";
 }
@@ -249,7 +250,7 @@ std::string nearest_key(std::string_view key) {
 void apply_limit(Configuration& configuration, const Given& given, std::string_view name,
                  Faults& faults) {
   const LimitInfo* limit = find_limit(name);
-  if (limit == nullptr) {
+  if (limit == nullptr || !(limit->setting || given.label == "--limit")) {
     faults.push_back({given.place, "there is no limit '" + escaped(name, kQuotedMax) + "'" +
                                        nearest_limit(name) + " (tcphub --help-limits shows all)"});
     return;
@@ -353,20 +354,17 @@ Faults warnings_about(const Configuration& configuration) {
   const std::uint64_t bytes = frames * (proto::kHeaderSize + limits.watch_event_bytes);
   if (bytes <= limits.control_bytes) return {};
   std::string place;
-  for (const char* key : {"control_bytes", "watch_event_bytes", "watch_window_per_node",
-                          "watch_window", "watches_per_node", "watches"}) {
+  for (const char* key : {"control_bytes", "watches_per_node"}) {
     const auto where = configuration.places.find(std::string{kLimits} + key);
     if (where != configuration.places.end() && place.empty()) place = where->second.place;
   }
-  return {
-      {place,
-       "the watches of one node may have " + std::to_string(frames) + " WATCH_EVENTS of " +
-           std::to_string(limits.watch_event_bytes) + " bytes waiting for it, " +
-           std::to_string(bytes) + " bytes with their headers, and limit control_bytes (" +
-           std::to_string(limits.control_bytes) +
-           ") has a node sent away for more than that: make control_bytes " +
-           std::to_string(bytes) +
-           " or more, or watch_event_bytes, watch_window_per_node or watches_per_node smaller"}};
+  return {{place, "the watches of one node may have " + std::to_string(frames) +
+                      " WATCH_EVENTS of " + std::to_string(limits.watch_event_bytes) +
+                      " bytes waiting for it, " + std::to_string(bytes) +
+                      " bytes with their headers, and limit control_bytes (" +
+                      std::to_string(limits.control_bytes) +
+                      ") has a node sent away for more than that: make control_bytes " +
+                      std::to_string(bytes) + " or more, or watches_per_node smaller"}};
 }
 
 std::string print(const Configuration& configuration) {
@@ -378,9 +376,9 @@ std::string print(const Configuration& configuration) {
             origin_of(configuration, key) + "\n";
   }
   text += "\n[limits]\n";
-  for (const LimitInfo& limit : limit_table()) {
-    const std::string name{limit.name};
-    text += name + " = " + std::to_string(configuration.options.limits.*limit.field) + "  # " +
+  for (const LimitInfo* limit : limit_settings()) {
+    const std::string name{limit->name};
+    text += name + " = " + std::to_string(configuration.options.limits.*(limit->field)) + "  # " +
             origin_of(configuration, std::string{kLimits} + name) + "\n";
   }
   return text;

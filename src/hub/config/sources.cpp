@@ -143,9 +143,9 @@ std::string key_of(std::string_view variable) {
   for (const Setting& setting : settings()) {
     if (variable == std::string{kPrefix} + upper(setting.key)) return std::string{setting.key};
   }
-  for (const LimitInfo& limit : limit_table()) {
-    if (variable == std::string{kLimitsPrefix} + upper(limit.name))
-      return "limits." + std::string{limit.name};
+  for (const LimitInfo* limit : limit_settings()) {
+    if (variable == std::string{kLimitsPrefix} + upper(limit->name))
+      return "limits." + std::string{limit->name};
   }
   return {};
 }
@@ -154,8 +154,8 @@ std::string nearest_variable(std::string_view variable) {
   std::vector<std::string> all{std::string{kFileVariable}};
   for (const Setting& setting : settings())
     all.push_back(std::string{kPrefix} + upper(setting.key));
-  for (const LimitInfo& limit : limit_table())
-    all.push_back(std::string{kLimitsPrefix} + upper(limit.name));
+  for (const LimitInfo* limit : limit_settings())
+    all.push_back(std::string{kLimitsPrefix} + upper(limit->name));
   const std::vector<std::string_view> views(all.begin(), all.end());
   return did_you_mean(variable, views);
 }

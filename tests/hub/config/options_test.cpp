@@ -164,8 +164,19 @@ TEST(Options, HelpAndVersionEndWell) {
   EXPECT_THAT(ending({"--version"}).text, HasSubstr("tcphub "));
   const CommandLineEnding limits = ending({"--help-limits"});
   EXPECT_EQ(limits.exit_code, 0);
-  for (const LimitInfo& limit : limit_table())
-    EXPECT_THAT(limits.text, HasSubstr(std::string{limit.name}));
+  for (const LimitInfo& limit : limit_table()) {
+    // The whole word: one name may be a part of another.
+    const auto shown = limits.text.find("\n  " + std::string{limit.name} + " ");
+    EXPECT_EQ(shown != std::string::npos, limit.setting) << limit.name;
+  }
+}
+
+TEST(Options, EveryLimitIsReachedByItsFlag) {
+  for (const LimitInfo& limit : limit_table()) {
+    if (limit.name == "keep_alive_ms" || limit.name == "silent_ms") continue;  // they have to agree
+    const std::string given = std::string{limit.name} + "=" + std::to_string(limit.most);
+    EXPECT_EQ(options({"--limit", given.c_str()}).limits.*limit.field, limit.most) << limit.name;
+  }
 }
 
 TEST(Options, FlagsAreStrongerThanTheEnvironment) {
