@@ -1,11 +1,14 @@
-// Any bytes as the payload of a ROUTE frame (RECORD, RECORDS_END, KEEP_ALIVE). Input: a payload.
+// Any bytes as the payload of a ROUTE frame (RECORD, RECORDS_END, KEEP_ALIVE, NAMES and
+// its like). Input: a payload.
 
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
 
 #include "fuzz/support/control_round_trip.hpp"
+#include "proto/control/names.hpp"
 #include "proto/control/route.hpp"
+#include "proto/control/route_names.hpp"
 
 namespace {
 
@@ -29,6 +32,22 @@ void check_bounds(std::span<const std::byte> payload) {
   }
 }
 
+/// Those that the copies of names rely on.
+void check_names(std::span<const std::byte> payload) {
+  const auto names = decode<route::Names>(payload);
+  if (!names) return;
+  std::uint64_t last = names->after;
+  for (const route::NameRecord& each : names->records) {
+    FUZZ_MUST(each.claim.version > last);
+    last = each.claim.version;
+    FUZZ_MUST(valid_name(each.name));
+    if (each.claim.state == route::NameState::deleted) continue;
+    FUZZ_MUST(hub_of(each.claim.node) == names->hub);
+    FUZZ_MUST(!each.claim.service || hub_of(each.claim.service->group) == names->hub);
+  }
+  FUZZ_MUST(last <= names->version || names->records.empty());
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -36,6 +55,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   fuzz::check_message<route::RecordPart>(payload.span());
   fuzz::check_message<route::RecordsEnd>(payload.span());
   fuzz::check_message<route::KeepAlive>(payload.span());
+  fuzz::check_message<route::NamesKnown>(payload.span());
+  fuzz::check_message<route::Names>(payload.span());
+  fuzz::check_message<route::NamesTaken>(payload.span());
   check_bounds(payload.span());
+  check_names(payload.span());
   return 0;
 }

@@ -14,7 +14,14 @@
 
 namespace gimnet::proto::route {
 
-enum class Operation : std::uint16_t { record = 1, records_end = 2, keep_alive = 3 };
+enum class Operation : std::uint16_t {
+  record = 1,
+  records_end = 2,
+  keep_alive = 3,
+  names_known = 4,
+  names = 5,
+  names_taken = 6,
+};
 
 /// A part has at most so many neighbours, and a record at most so many parts: the hub in the middle
 /// of a star of all hubs has 4,093 neighbours.

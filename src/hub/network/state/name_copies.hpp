@@ -1,0 +1,183 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <set>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "hub/network/state/name_index.hpp"
+
+namespace gimnet::hub {
+
+/// A process that serves under a hub id.
+struct HubRun {
+  HubId hub;
+  proto::HubInstance instance;
+  friend auto operator<=>(const HubRun&, const HubRun&) = default;
+};
+
+/// A name as those see it that ask for it.
+enum class Standing : std::uint8_t {
+  held,
+  away,         ///< its node has lost its connection: a newcomer may take the name
+  unreachable,  ///< its hub cannot be reached, or has restarted: nobody may take it for a while
+};
+
+/// A name as this hub knows it. Valid until: something changes.
+struct KnownName {
+  std::string_view name;
+  HubId hub;
+  const proto::route::NameClaim* claim = nullptr;
+  Standing standing = Standing::held;
+  std::chrono::milliseconds until{};  ///< unreachable: when it is free
+};
+
+/// A name of another hub came, changed or went.
+struct NameChange {
+  std::string name;
+  HubId hub;
+  std::optional<proto::route::NameClaim> before;
+  std::optional<proto::route::NameClaim> after;
+};
+
+/// The place up to which the other side of a link has the names of one hub.
+struct NamesPosition {
+  proto::HubInstance instance;
+  std::uint64_t version = 0;    ///< complete up to it, once all that was sent has come
+  std::uint64_t forgotten = 0;  ///< as it was when the copy was last sent from its beginning
+};
+
+/// The names of all hubs: this hub's own, which it numbers by versions, and a copy of those of each
+/// hub that can be reached. A copy is complete up to a version: it has each name that changed last
+/// up to there as it is now. So what changed in a range of versions extends every copy that is
+/// complete up to the begin of the range, from whichever link it comes. Thread safety: none. Time
+/// is an argument. Limits: Options::bytes_max for all names; of deleted names as many as of living
+/// ones of that hub, and kMarksLeast more.
+class NameCopies {
+ public:
+  struct Options {
+    HubRun self;
+    std::chrono::milliseconds grace = std::chrono::seconds(30);
+    std::size_t bytes_max = std::size_t{64} << 20;  ///< 1 MiB at least
+  };
+  static constexpr std::size_t kMarksLeast = 1'024;
+
+  explicit NameCopies(const Options& options);
+
+  // This hub's own names
+
+  /// A node of this hub has the name, or provides the service of that full name. A claim of another
+  /// node than before has the rank that follows those which it takes over. `claim`: version and
+  /// rank are not looked at.
+  void put_own(std::string_view name, const proto::route::NameClaim& claim);
+  /// Nothing happens for a name that is none of this hub.
+  void remove_own(std::string_view name);
+  /// Takes another hub id. All own names are to be put again.
+  void renumber(HubId hub);
+  /// Own names that a hub that can be reached has a better claim to, since the last call. The
+  /// caller lets go of them, which it says by remove_own().
+  [[nodiscard]] std::vector<KnownName> take_lost();
+  /// There is no room for further names.
+  [[nodiscard]] bool is_full() const { return bytes() >= options_.bytes_max; }
+
+  // Copies
+
+  /// These hubs can be reached now, besides this one. REQUIRES: ascending, each hub id once.
+  /// Answers those whose copy has begun, or may go on.
+  std::vector<HubId> set_reachable(std::span<const HubRun> hubs, std::chrono::milliseconds now);
+  /// Drops copies of hubs that could not be reached for the grace time, and names of the process
+  /// before. True: something was dropped.
+  bool forget(std::chrono::milliseconds now);
+  [[nodiscard]] std::optional<std::chrono::milliseconds> next_due() const;
+
+  enum class Taken : std::uint8_t {
+    changed,
+    known,  ///< nothing new, or of a process of which there is no copy, or not what follows
+    full,   ///< there is no room: starved() names the hub
+  };
+  Taken take(const proto::route::Names& names);
+  /// The next message for a receiver that is at that place, which it moves. Nothing: it has all.
+  [[nodiscard]] std::optional<proto::route::Names> next(HubId hub, NamesPosition& at) const;
+  /// Of each other hub that can be reached.
+  [[nodiscard]] std::vector<proto::route::NamesKnown::Entry> known() const;
+  [[nodiscard]] std::optional<proto::route::NamesKnown::Entry> known(HubId hub) const;
+  /// Hubs whose names did not fit when they came, once there is room again.
+  [[nodiscard]] std::vector<HubId> take_starved();
+
+  // Look-ups, among all hubs
+
+  /// The best claim to a name: of hubs that can be reached before others.
+  [[nodiscard]] std::optional<KnownName> find(std::string_view name) const;
+  [[nodiscard]] std::optional<KnownName> find_node(NodeId node) const;
+  [[nodiscard]] std::optional<KnownName> find_group(GroupId group) const;
+  /// The first one with a higher id, for listings.
+  [[nodiscard]] std::optional<KnownName> node_after(NodeId node) const;
+  [[nodiscard]] std::optional<KnownName> group_after(GroupId group) const;
+  /// Of other hubs, in the order in which they happened. Nothing is told of a copy that is dropped
+  /// as a whole: `dropped_copies` counts these.
+  [[nodiscard]] std::vector<NameChange> take_changes() { return std::exchange(changes_, {}); }
+  [[nodiscard]] std::uint64_t dropped_copies() const { return dropped_copies_; }
+
+  [[nodiscard]] const HubRun& self() const { return options_.self; }
+  [[nodiscard]] std::size_t bytes() const { return index_.bytes(); }
+  [[nodiscard]] std::size_t size() const { return index_.nodes().size() + index_.groups().size(); }
+  /// Times that names of a hub were not taken since there was no room.
+  [[nodiscard]] std::uint64_t refused() const { return refused_; }
+
+ private:
+  using Place = NameIndex::Place;
+  /// Version 0 is that of a name of the process before.
+  struct Copy {
+    proto::HubInstance instance;
+    std::uint64_t version = 0;    ///< complete up to it
+    std::uint64_t forgotten = 0;  ///< marks up to it may be missing
+    std::map<std::uint64_t, Place> by_version;
+    std::set<std::uint64_t> marks;  ///< versions of deleted names
+    std::optional<std::chrono::milliseconds> unreachable_until;
+    std::optional<std::chrono::milliseconds> former_until;
+    bool starved = false;
+  };
+
+  [[nodiscard]] Copy& own() { return copies_.at(options_.self.hub); }
+  /// Only if it is of that process.
+  [[nodiscard]] Copy* find_copy(const HubRun& run);
+  [[nodiscard]] KnownName known_name(const NameIndex::Claims::value_type& entry) const;
+  template <class Index>
+  [[nodiscard]] std::optional<KnownName> known_name(const Index& index,
+                                                    typename Index::const_iterator at) const {
+    return at == index.end() ? std::nullopt : std::optional{known_name(*at->second)};
+  }
+  void begin_anew(HubId hub, Copy& copy, proto::HubInstance instance,
+                  std::chrono::milliseconds now);
+  void drop(HubId hub);
+  void drop_former(HubId hub, Copy& copy);
+  void put(HubId hub, Copy& copy, std::string_view name, const proto::route::NameClaim& claim);
+  static void forget_version(Copy& copy, const proto::route::NameClaim& claim);
+  void erase(Copy& copy, Place place);
+  /// Also tells of it.
+  void remove(Copy& copy, Place place);
+  void forget_marks(Copy& copy);
+  /// Makes room at the id that the claim has. False: a newer name has it.
+  [[nodiscard]] bool evict(Copy& copy, std::string_view name, const proto::route::NameClaim& claim);
+  [[nodiscard]] std::uint32_t rank_for(std::string_view name, NodeId node) const;
+  [[nodiscard]] bool is_lost_to(const KnownName& other) const;
+  void compare_with_own(std::string_view name);
+  void note_change(Place place, std::optional<proto::route::NameClaim> before);
+
+  Options options_;
+  NameIndex index_;
+  std::map<HubId, Copy> copies_;  ///< this hub's own among them
+  std::set<std::string, std::less<>> lost_;
+  std::vector<NameChange> changes_;
+  std::uint64_t refused_ = 0;
+  std::uint64_t dropped_copies_ = 0;
+};
+
+}  // namespace gimnet::hub

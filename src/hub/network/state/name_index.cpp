@@ -1,0 +1,72 @@
+#include "hub/network/state/name_index.hpp"
+
+namespace gimnet::hub {
+
+using proto::route::NameClaim;
+using proto::route::NameState;
+
+bool wins(const NameClaim& claim, const NameClaim& over) {
+  if (claim.service.has_value() != over.service.has_value()) return !claim.service;
+  if (claim.rank != over.rank) return claim.rank > over.rank;
+  return claim.node < over.node;
+}
+
+std::optional<NameIndex::Place> NameIndex::find(std::string_view name, HubId hub) const {
+  const auto found = claims_.find(KeyView{name, hub});
+  return found == claims_.end() ? std::nullopt : std::optional{found};
+}
+
+std::optional<NameIndex::Place> NameIndex::holder(const NameClaim& claim) const {
+  const auto in = [](const auto& index, auto id) {
+    const auto found = index.find(id);
+    return found == index.end() ? std::nullopt : std::optional{found->second};
+  };
+  return claim.service ? in(groups_, claim.service->group) : in(nodes_, claim.node);
+}
+
+std::vector<NameIndex::Place> NameIndex::live_of(HubId hub) const {
+  std::vector<Place> places;
+  const auto add = [&places, hub](const auto& index, auto first) {
+    for (auto each = index.lower_bound(first); each != index.end() && hub_of(each->first) == hub;
+         ++each)
+      places.push_back(each->second);
+  };
+  add(nodes_, make_id<NodeId>(hub, 0));
+  add(groups_, make_id<GroupId>(hub, 0));
+  return places;
+}
+
+NameIndex::Place NameIndex::put(std::string_view name, HubId hub, const NameClaim& claim) {
+  auto place = claims_.find(KeyView{name, hub});
+  if (place == claims_.end()) {
+    place = claims_.try_emplace(Key{std::string{name}, hub}).first;
+    bytes_ += count_of(name);
+  } else {
+    forget_id(place->second);
+  }
+  place->second = claim;
+  if (claim.state == NameState::deleted) return place;
+  if (claim.service) {
+    groups_[claim.service->group] = place;
+  } else {
+    nodes_[claim.node] = place;
+  }
+  return place;
+}
+
+void NameIndex::erase(Place place) {
+  forget_id(place->second);
+  bytes_ -= count_of(place->first.name);
+  claims_.erase(place);
+}
+
+void NameIndex::forget_id(const NameClaim& claim) {
+  if (claim.state == NameState::deleted) return;
+  if (claim.service) {
+    groups_.erase(claim.service->group);
+  } else {
+    nodes_.erase(claim.node);
+  }
+}
+
+}  // namespace gimnet::hub
