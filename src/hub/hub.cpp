@@ -137,7 +137,7 @@ struct Ground {
 HubFacts facts_of(const HubOptions& options) {
   HubFacts facts;
   facts.id = options.id;
-  facts.name = options.name;
+  facts.name = options.shown_name();
   facts.version = kVersion;
   facts.shards = options.shards;
   facts.started = std::chrono::milliseconds{steady_now_ns() / 1'000'000};

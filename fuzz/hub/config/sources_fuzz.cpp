@@ -92,11 +92,18 @@ void check_options(const HubOptions& options) {
   }
   FUZZ_MUST(options.shards >= 1 && options.shards <= kShardCountMax);
   FUZZ_MUST(options.id.value() >= 1 && options.id.value() <= kHubIdMax);
-  FUZZ_MUST(proto::valid_name(options.name));
+  FUZZ_MUST(proto::valid_name(options.shown_name()));
   FUZZ_MUST(options.limits.silent_ms > options.limits.keep_alive_ms);
   const bool local =
       std::ranges::all_of(options.listen, [](const ListenUrl& url) { return url.is_local(); });
   FUZZ_MUST(local || options.insecure);
+  std::set<std::string> names;
+  for (const DialledLink& link : options.links.dial) {
+    FUZZ_MUST(names.insert(link.name).second && !link.name.empty());
+    FUZZ_MUST(is_local(link.address) || options.insecure);
+    FUZZ_MUST(link.terms.silent_ms > link.terms.keep_alive_ms);
+  }
+  FUZZ_MUST(options.links.accepted.silent_ms > options.links.accepted.keep_alive_ms);
 }
 
 /// What is printed is read as what it was.

@@ -22,8 +22,8 @@ struct OptionText {
 };
 
 /// In the order of the help.
-const std::array<OptionText, 16>& option_texts() {
-  static const std::array<OptionText, 16> texts{
+const std::array<OptionText, 18>& option_texts() {
+  static const std::array<OptionText, 18> texts{
       {{"-h,--help", "", "Says this and ends"},
        {"--listen", "URL",
         "Address to listen on, may be repeated: tcp://127.0.0.1:7450, tcp://[::1]:0 (any free "
@@ -31,15 +31,22 @@ const std::array<OptionText, 16>& option_texts() {
         "folder"},
        {"--shards", "N",
         "Threads that carry data, 1 to 16. Default: half of the processors, at most 8"},
-       {"--hub-id", "N", "This hub's number in its network, 1 to 4094. Default: 1"},
+       {"--hub-id", "N",
+        "This hub's number in its network, 1 to 4094. Default: 1, and a random one from 1024 on "
+        "for "
+        "a\nhub with --link"},
        {"--hub-name", "NAME", "Its name for people. Default: hub-ID"},
        {"--state-dir", "DIR", "Folder for what the hub keeps, created if needed"},
+       {"--link", "URL",
+        "Hub to link to, may be repeated: tcp://HOST:PORT or unix:/PATH. It must accept links"},
+       {"--accept-links", "", "Takes links of other hubs, which may speak for nodes of theirs"},
        {"--limit", "NAME=VALUE", "Sets a limit, may be repeated; --help-limits lists them"},
        {"--help-limits", "", "Lists all limits and ends"},
        {"--placement", "HOW",
         "Where new nodes live: spread (the least loaded shard; default) or hint (as HELLO wishes)"},
        {"--spin", "", "Shards never sleep: shorter round trips, for a whole processor each"},
-       {"--insecure", "", "Allows to listen on addresses that other machines reach"},
+       {"--insecure", "",
+        "Allows to listen on addresses that other machines reach, and links to other machines"},
        {"--log-level", "LEVEL", "error, warning, info (default), debug or off"},
        {"--config", "FILE",
         "Configuration file (TOML); conf.d/*.toml beside it are read too. Default: the first that "
@@ -153,17 +160,19 @@ Given flag(const std::string& key, const std::string& label, std::string text) {
 /// The flags that were given, as values of their keys. Returns what is wrong with their form, or
 /// "".
 std::string read_flags(const CLI::App& app, ConfigSources& sources) {
-  if (app.count("--listen") != 0) {
-    Given& listen = sources.flags.emplace_back(flag("listen", "--listen", {}));
-    listen.value.kind = ConfigValue::Kind::list;
-    for (const std::string& url : app.get_option("--listen")->results())
-      listen.value.items.push_back({ConfigValue::Kind::words, url, {}, {}});
+  for (const char* name : {"--listen", "--link"}) {
+    if (app.count(name) == 0) continue;
+    Given& urls = sources.flags.emplace_back(flag(name + 2, name, {}));
+    urls.value.kind = ConfigValue::Kind::list;
+    for (const std::string& url : app.get_option(name)->results())
+      urls.value.items.push_back({ConfigValue::Kind::words, url, {}, {}});
   }
-  for (const char* name : {"--shards", "--hub-id", "--hub-name", "--state-dir", "--placement",
-                           "--log-level", "--spin", "--insecure"}) {
+  for (const char* name : {"--shards", "--hub-id", "--hub-name", "--state-dir", "--accept-links",
+                           "--placement", "--log-level", "--spin", "--insecure"}) {
     if (app.count(name) == 0) continue;
     std::string key = std::string{name}.substr(2);
     std::ranges::replace(key, '-', '_');
+    if (key == "accept_links") key = "links." + key;
     const CLI::Option* option = app.get_option(name);
     const bool is_flag = option->get_items_expected_max() == 0;
     // Also --spin=false, which is stronger than what a file says.

@@ -4,13 +4,12 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
-#include <cmath>
 #include <optional>
 #include <set>
 
 #include "base/suggest.hpp"
 #include "hub/config/folders.hpp"
+#include "hub/config/link_settings.hpp"
 #include "hub/config/toml_file.hpp"
 #include "hub/version.hpp"
 #include "proto/control/names.hpp"
@@ -22,70 +21,8 @@ namespace {
 using Kind = ConfigValue::Kind;
 
 constexpr std::string_view kLimits = "limits.";
+constexpr std::string_view kLinks = "links.";
 constexpr std::array<std::string_view, 2> kPlacements{"spread", "hint"};
-
-std::string_view kind_name(Kind kind) {
-  constexpr std::array<std::string_view, 8> kNames{"words",         "a text",     "a whole number",
-                                                   "true or false", "a fraction", "a date or time",
-                                                   "a list",        "a table"};
-  return kNames[static_cast<std::size_t>(kind)];
-}
-
-Fault fault(const Given& given, std::string sentence) {
-  return {given.value.place, std::move(sentence)};
-}
-
-/// Is the value of that kind? If not, what to write instead is a fault.
-bool has_kind(const Given& given, Kind wanted, const std::string& example, Faults& faults) {
-  if (given.value.kind == wanted || given.value.kind == Kind::words) return true;
-  faults.push_back(fault(given, given.label + " is " + std::string{kind_name(wanted)} + ", not " +
-                                    std::string{kind_name(given.value.kind)} + ": write " +
-                                    example));
-  return false;
-}
-
-/// What may be written instead of a value that is no whole number: the nearest one to what can be
-/// read as a number, or the usual one.
-std::uint64_t nearest_number(const ConfigValue& value, std::uint64_t least, std::uint64_t most,
-                             std::uint64_t usual) {
-  if (value.kind != Kind::text && value.kind != Kind::fraction) return usual;
-  double number = 0.0;
-  const char* const last = value.text.data() + value.text.size();
-  const auto [end, error] = std::from_chars(value.text.data(), last, number);
-  if (error != std::errc{} || end != last || !std::isfinite(number)) return usual;
-  if (number <= static_cast<double>(least)) return least;
-  if (number >= static_cast<double>(most)) return most;
-  return static_cast<std::uint64_t>(std::llround(number));
-}
-
-std::optional<std::size_t> number_in(const Given& given, std::size_t least, std::size_t most,
-                                     Faults& faults) {
-  const std::uint64_t instead = nearest_number(given.value, least, most, least);
-  if (!has_kind(given, Kind::integer, given.label + " = " + std::to_string(instead), faults))
-    return std::nullopt;
-  const std::string& text = given.value.text;
-  std::size_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error == std::errc{} && end == text.data() + text.size() && value >= least && value <= most)
-    return value;
-  faults.push_back(fault(given, given.label + " cannot be '" + escaped(text, kQuotedMax) +
-                                    "': give a whole number from " + std::to_string(least) +
-                                    " to " + std::to_string(most)));
-  return std::nullopt;
-}
-
-/// One of a few words.
-bool one_of(const Given& given, std::span<const std::string_view> words, const std::string& list,
-            Faults& faults) {
-  if (!has_kind(given, Kind::text, given.label + " = \"" + std::string{words.front()} + "\"",
-                faults))
-    return false;
-  if (std::ranges::find(words, given.value.text) != words.end()) return true;
-  faults.push_back(fault(given, given.label + " cannot be '" +
-                                    escaped(given.value.text, kQuotedMax) + "': " + list +
-                                    did_you_mean(given.value.text, words)));
-  return false;
-}
 
 /// Each of them is another one.
 bool any_free_port(const ListenUrl& url) {
@@ -103,7 +40,7 @@ void set_listen(Configuration& configuration, const Given& given, Faults& faults
   configuration.listen_places.clear();
   if (urls.empty()) {
     faults.push_back(
-        fault(given, given.label + " names no address; leave it out for the default ones"));
+        value_fault(given, given.label + " names no address; leave it out for the default ones"));
   }
   std::set<std::string> known;
   for (const ConfigValue& url : urls) {
@@ -133,14 +70,16 @@ void set_shards(Configuration& configuration, const Given& given, Faults& faults
 
 void set_hub_id(Configuration& configuration, const Given& given, Faults& faults) {
   const auto id = number_in(given, 1, kHubIdMax, faults);
-  if (id) configuration.options.id = HubId{static_cast<std::uint16_t>(*id)};
+  if (!id) return;
+  configuration.options.id = HubId{static_cast<std::uint16_t>(*id)};
+  configuration.options.id_configured = true;
 }
 
 void set_hub_name(Configuration& configuration, const Given& given, Faults& faults) {
   if (!has_kind(given, Kind::text, "hub_name = \"hall\"", faults)) return;
   if (const char* wrong = proto::name_fault(given.value.text)) {
-    faults.push_back(fault(given, given.label + " cannot be '" +
-                                      escaped(given.value.text, kQuotedMax) + "': " + wrong));
+    faults.push_back(value_fault(given, given.label + " cannot be '" +
+                                            escaped(given.value.text, kQuotedMax) + "': " + wrong));
     return;
   }
   configuration.options.name = given.value.text;
@@ -151,11 +90,13 @@ void set_state_dir(Configuration& configuration, const Given& given, Faults& fau
   if (given.value.kind == Kind::words && given.value.text.empty()) {
     // Mostly a shell variable that is not set; a hub that kept its state elsewhere would begin
     // anew.
-    faults.push_back(fault(given, given.label + " is empty: give it a folder, or leave it out"));
+    faults.push_back(
+        value_fault(given, given.label + " is empty: give it a folder, or leave it out"));
     return;
   }
   if (given.value.text.find('\0') != std::string::npos) {
-    faults.push_back(fault(given, given.label + " cannot be a path: there is a zero byte in it"));
+    faults.push_back(
+        value_fault(given, given.label + " cannot be a path: there is a zero byte in it"));
     return;
   }
   configuration.options.state_dir = given.value.text;
@@ -169,14 +110,7 @@ void set_placement(Configuration& configuration, const Given& given, Faults& fau
 
 template <bool HubOptions::* option>
 void set_flag(Configuration& configuration, const Given& given, Faults& faults) {
-  if (!has_kind(given, Kind::boolean, given.label + " = true", faults)) return;
-  if (given.value.text != "true" && given.value.text != "false") {
-    faults.push_back(fault(given, given.label + " cannot be '" +
-                                      escaped(given.value.text, kQuotedMax) +
-                                      "': write true or false"));
-    return;
-  }
-  configuration.options.*option = given.value.text == "true";
+  if (const auto value = true_or_false(given, faults)) configuration.options.*option = *value;
 }
 
 template <bool HubOptions::* option>
@@ -211,7 +145,7 @@ constexpr std::array kSettings{
     Setting{"hub_id", "the hub's number, 1 to 4094", false, set_hub_id,
             [](const HubOptions& options) { return std::to_string(options.id.value()); }},
     Setting{"hub_name", "its name for people", false, set_hub_name,
-            [](const HubOptions& options) { return toml_quoted(options.name); }},
+            [](const HubOptions& options) { return toml_quoted(options.shown_name()); }},
     Setting{"state_dir", "folder of what the hub keeps over its restarts; \"\" is the default one",
             false, set_state_dir,
             [](const HubOptions& options) { return toml_quoted(options.state_dir); }},
@@ -221,18 +155,36 @@ constexpr std::array kSettings{
             }},
     Setting{"spin", "shards never sleep", false, set_flag<&HubOptions::spin>,
             show_flag<&HubOptions::spin>},
-    Setting{"insecure", "allows addresses that other machines reach", false,
+    Setting{"insecure", "allows addresses of other machines", false,
             set_flag<&HubOptions::insecure>, show_flag<&HubOptions::insecure>},
     Setting{"log_level", "error, warning, info, debug or off", true, set_log_level, show_log_level},
+    Setting{"link", "links to other hubs that this one dials", false, set_link, show_link},
+    Setting{"links.accept_links", "takes links that other hubs dial", false, set_accept_links,
+            [](const HubOptions& options) {
+              return std::string{options.links.accept ? "true" : "false"};
+            }},
+    Setting{"links.keep_alive_ms", "sign of life on links that others dial", false,
+            set_accepted_terms,
+            [](const HubOptions& options) {
+              return std::to_string(options.links.accepted.keep_alive_ms);
+            }},
+    Setting{
+        "links.silent_ms", "silence that ends a link that another hub dialled", false,
+        set_accepted_terms,
+        [](const HubOptions& options) { return std::to_string(options.links.accepted.silent_ms); }},
+    Setting{"links.allow", "hubs that such a link may bring frames of; [] is all", false,
+            set_accepted_terms,
+            [](const HubOptions& options) { return show_hubs(options.links.accepted.allow); }},
 };
 
 /// Every key, of limits the full name. A wrong file asks for them once for each of its lines.
 const std::vector<std::string>& all_keys() {
   static const std::vector<std::string> all = [] {
     std::vector<std::string> keys;
-    keys.reserve(std::size(kSettings) + 1 + limit_settings().size());
+    keys.reserve(std::size(kSettings) + 2 + limit_settings().size());
     for (const Setting& setting : kSettings) keys.emplace_back(setting.key);
     keys.emplace_back("limits");
+    keys.emplace_back("links");
     for (const LimitInfo* limit : limit_settings())
       keys.push_back(std::string{kLimits} + std::string{limit->name});
     return keys;
@@ -266,7 +218,7 @@ void apply_limit(Configuration& configuration, const Given& given, std::string_v
   if (error.empty()) return;
   // Of a file the place says where that stands; of the environment only the variable's name can.
   if (given.origin.starts_with("environment ")) error = given.label + ": " + error;
-  faults.push_back(fault(given, std::move(error)));
+  faults.push_back(value_fault(given, std::move(error)));
 }
 
 /// WATCH_EVENTS that may wait for one node: of each watch a window, of all a window per node, but
@@ -308,11 +260,10 @@ void apply(Configuration& configuration, const Given& given, Faults& faults) {
   } else if (const auto* setting = std::ranges::find(kSettings, given.key, &Setting::key);
              setting != kSettings.end()) {
     setting->set(configuration, given, faults);
-  } else if (given.key == "limits") {
+  } else if (given.key == "limits" || given.key == "links") {
     if (given.value.kind != Kind::table) {
-      faults.push_back(
-          {given.place,
-           "limits is a table: write [limits], and below it a line NAME = NUMBER for each"});
+      faults.push_back({given.place, given.key + " is a table: write [" + given.key +
+                                         "], and below it a line NAME = VALUE for each"});
     }
     return;
   } else {
@@ -323,8 +274,7 @@ void apply(Configuration& configuration, const Given& given, Faults& faults) {
 }
 
 void complete(Configuration& configuration, Faults& faults) {
-  HubOptions& options = configuration.options;
-  if (options.name.empty()) options.name = "hub-" + std::to_string(options.id.value());
+  const HubOptions& options = configuration.options;
   for (std::size_t i = 0; i < options.listen.size(); ++i) {
     if (options.listen[i].is_local() || options.insecure) continue;
     const Fault& where = configuration.listen_places[i];
@@ -335,6 +285,7 @@ void complete(Configuration& configuration, Faults& faults) {
              ": other machines could reach it, and nothing that is sent is encrypted; where " +
              "all of them are trusted give " + word + ", otherwise listen on 127.0.0.1"});
   }
+  complete_links(configuration, faults);
   const Limits& limits = options.limits;
   if (limits.silent_ms <= limits.keep_alive_ms) {
     auto where = configuration.places.find("limits.silent_ms");
@@ -370,10 +321,14 @@ Faults warnings_about(const Configuration& configuration) {
 std::string print(const Configuration& configuration) {
   std::string text = "# tcphub " + std::string{kVersion} +
                      ": the configuration in force, and where each value came from\n\n";
+  bool in_links = false;
   for (const Setting& setting : kSettings) {
     const std::string key{setting.key};
-    text += key + " = " + setting.show(configuration.options) + "  # " +
-            origin_of(configuration, key) + "\n";
+    const bool below = key.starts_with(kLinks);
+    if (below && !in_links) text += "\n[links]\n";
+    in_links = below;
+    text += (below ? key.substr(kLinks.size()) : key) + " = " +
+            setting.show(configuration.options) + "  # " + origin_of(configuration, key) + "\n";
   }
   text += "\n[limits]\n";
   for (const LimitInfo* limit : limit_settings()) {

@@ -10,6 +10,7 @@
 #include "base/ids.hpp"
 #include "base/log.hpp"
 #include "hub/config/value.hpp"
+#include "hub/control/link_options.hpp"
 #include "hub/control/listen_url.hpp"
 #include "hub/control/state/sessions.hpp"
 #include "hub/limits.hpp"
@@ -21,13 +22,19 @@ struct HubOptions {
   std::vector<ListenUrl> listen;  ///< empty: the default addresses
   std::size_t shards = 1;
   HubId id{1};
-  std::string name;
+  bool id_configured = false;
+  std::string name;       ///< "": after the id
   std::string state_dir;  ///< "": the default one
   Placement placement = Placement::spread;
-  bool insecure = false;
-  bool spin = false;  ///< shards never sleep
+  bool insecure = false;  ///< also where other machines can be reached, or reach this one
+  bool spin = false;      ///< shards never sleep
   LogLevel log_level = LogLevel::info;
+  LinksOptions links;
   Limits limits;
+
+  [[nodiscard]] std::string shown_name() const {
+    return name.empty() ? "hub-" + std::to_string(id.value()) : name;
+  }
 };
 
 inline constexpr std::size_t kShardCountMax = 16;
@@ -46,10 +53,12 @@ struct Configuration {
   std::map<std::string, std::string, std::less<>> origins;
   /// One for each of options.listen, for what can only be judged when all is known.
   std::vector<Fault> listen_places;
+  std::vector<std::string> link_places;              ///< the same of options.links.dial
+  std::string proxy{};                               ///< GIMNET_PROXY, for links that name none
   std::map<std::string, Fault, std::less<>> places;  ///< as `origins`; the sentence is the label
 };
 
-/// A key outside [limits].
+/// A key outside [limits]: "shards", "links.allow".
 struct Setting {
   std::string_view key;
   std::string_view meaning;

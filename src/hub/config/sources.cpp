@@ -130,9 +130,12 @@ namespace fs = std::filesystem;
 constexpr std::string_view kPrefix = "TCPHUB_";
 constexpr std::string_view kLimitsPrefix = "TCPHUB_LIMITS_";
 constexpr std::string_view kFileVariable = "TCPHUB_CONFIG";
+constexpr std::string_view kProxyVariable = "GIMNET_PROXY=";
 
+/// As a variable's name has it.
 std::string upper(std::string_view text) {
   std::string result{text};
+  std::ranges::replace(result, '.', '_');
   std::ranges::transform(result, result.begin(),
                          [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
   return result;
@@ -160,7 +163,7 @@ std::string nearest_variable(std::string_view variable) {
   return did_you_mean(variable, views);
 }
 
-/// Addresses stand side by side in a variable, with blanks or commas between them.
+/// Addresses and hubs stand side by side in a variable, with blanks or commas between them.
 std::vector<ConfigValue> split(std::string_view text) {
   constexpr std::string_view kBetween = ", \t";
   std::vector<ConfigValue> parts;
@@ -178,7 +181,7 @@ Given from_environment(const std::string& variable, const std::string& key, std:
   given.label = variable;
   given.origin = "environment " + variable;
   given.value.text = text;
-  if (key == "listen") {
+  if (key == "listen" || key == "link" || key == "links.allow") {
     given.value.kind = ConfigValue::Kind::list;
     given.value.items = split(text);
   }
@@ -276,6 +279,7 @@ std::vector<std::string> read_environment(ConfigSources& sources, const char* co
   for (; *environment != nullptr; ++environment) {
     const std::string_view entry = *environment;
     const std::size_t equals = entry.find('=');
+    if (entry.starts_with(kProxyVariable)) sources.proxy = entry.substr(equals + 1);
     if (!entry.starts_with(kPrefix) || equals == std::string_view::npos) continue;
     const std::string variable{entry.substr(0, equals)};
     const std::string_view value = entry.substr(equals + 1);
@@ -300,6 +304,7 @@ ReadConfiguration read_configuration(const ConfigSources& sources, const ReadOpt
   ReadConfiguration read;
   read.faults = sources.faults;
   read.configuration.options.shards = default_shards();
+  read.configuration.proxy = sources.proxy;
   read.place =
       sources.file.empty() ? default_place() : ConfigPlace{sources.file, sources.parts_alone};
   if (!read.place.file.empty()) {

@@ -28,7 +28,8 @@ namespace gimnet::hub {
 namespace {
 
 constexpr std::size_t kQuotedLineMax = 120;
-constexpr std::string_view kOnlyTable = "limits";
+/// Their keys are told one by one, as "limits.nodes".
+constexpr std::array<std::string_view, 2> kTables{"limits", "links"};
 /// Limit: dots in a key. The library makes a table within a table of each, and frees them one
 /// within the other.
 constexpr std::size_t kKeyDotsMax = 64;
@@ -129,15 +130,23 @@ ConfigValue::Kind kind_of(const toml::node& node) {
   }
 }
 
-ConfigValue value_of(const toml::node& node, const Places& places) {
+/// Lists within tables within a list: [[link]] with its `allow`. Deeper ones are wrong whatever is
+/// in them.
+constexpr int kDepthMax = 3;
+
+ConfigValue value_of(const toml::node& node, const Places& places, int depth = 0) {
   ConfigValue value;
   value.kind = kind_of(node);
   value.text = text_of(node);
   value.place = places.of(node.source());
-  // Nothing is a list of lists: deeper ones are wrong whatever is in them.
+  if (depth == kDepthMax) return value;
   if (const toml::array* list = node.as_array()) {
-    for (const toml::node& item : *list) {
-      value.items.push_back({kind_of(item), text_of(item), {}, places.of(item.source())});
+    for (const toml::node& item : *list) value.items.push_back(value_of(item, places, depth + 1));
+  }
+  if (const toml::table* table = node.as_table(); table != nullptr && depth > 0) {
+    for (auto&& [key, item] : *table) {
+      value.items.push_back(value_of(item, places, depth + 1));
+      value.items.back().key = key.str();
     }
   }
   return value;
@@ -158,13 +167,14 @@ std::vector<Given> keys_of(const toml::table& table, const Places& places) {
   };
   for (auto&& [key, node] : table) {
     const std::string name{key.str()};
-    const toml::table* inner = name == kOnlyTable ? node.as_table() : nullptr;
+    const bool known = std::ranges::find(kTables, name) != kTables.end();
+    const toml::table* inner = known ? node.as_table() : nullptr;
     // Of a table that nobody knows only its name is told, and of an empty one.
     if (inner == nullptr || inner->empty()) {
       add(name, key, node);
       continue;
     }
-    for (auto&& [limit, value] : *inner) add(name + "." + std::string{limit.str()}, limit, value);
+    for (auto&& [own, value] : *inner) add(name + "." + std::string{own.str()}, own, value);
   }
   std::ranges::stable_sort(found, {}, &std::pair<Position, Given>::first);
   std::vector<Given> keys;

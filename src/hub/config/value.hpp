@@ -1,7 +1,11 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace gimnet::hub {
@@ -14,8 +18,9 @@ struct ConfigValue {
 
   Kind kind = Kind::words;
   std::string text;                ///< as written; a text without its quotes
-  std::vector<ConfigValue> items;  ///< of a list
+  std::vector<ConfigValue> items;  ///< of a list, and of a table within one
   std::string place;               ///< "FILE:LINE:COLUMN", or "" for words
+  std::string key{};               ///< of a value in such a table
 };
 
 /// A key and its value, from one of the places where they are set.
@@ -40,5 +45,32 @@ struct Fault {
 };
 
 using Faults = std::vector<Fault>;
+
+// Reading a value. What is wrong with it is a fault, with what to write instead. Thread safety:
+// pure functions.
+
+/// Something that is wrong with the value.
+[[nodiscard]] Fault value_fault(const Given& given, std::string sentence);
+
+/// A kind for people: "a whole number".
+[[nodiscard]] std::string_view kind_name(ConfigValue::Kind kind);
+
+/// Is the value of that kind? `example` is what to write instead.
+[[nodiscard]] bool has_kind(const Given& given, ConfigValue::Kind wanted,
+                            const std::string& example, Faults& faults);
+
+/// What may be written instead of a value that is no whole number: the nearest one to what can be
+/// read as a number, or `usual`.
+[[nodiscard]] std::uint64_t nearest_number(const ConfigValue& value, std::uint64_t least,
+                                           std::uint64_t most, std::uint64_t usual);
+
+[[nodiscard]] std::optional<std::size_t> number_in(const Given& given, std::size_t least,
+                                                   std::size_t most, Faults& faults);
+
+/// Is it one of a few words? `list` is how a sentence names them.
+[[nodiscard]] bool one_of(const Given& given, std::span<const std::string_view> words,
+                          const std::string& list, Faults& faults);
+
+[[nodiscard]] std::optional<bool> true_or_false(const Given& given, Faults& faults);
 
 }  // namespace gimnet::hub

@@ -2,9 +2,11 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/ids.hpp"
+#include "base/result.hpp"
 #include "net/address.hpp"
 
 namespace gimnet::hub {
@@ -37,5 +39,18 @@ struct LinksOptions {
   LinkTerms accepted{};  ///< of links that others dial
   std::vector<DialledLink> dial{};
 };
+
+/// Dialled links of one hub.
+inline constexpr std::size_t kDialledLinksMax = 4'093;
+
+/// A link to that URL. An empty name is the URL. Errors: a sentence that names what is wrong, and
+/// says how to write it.
+[[nodiscard]] Result<DialledLink> make_link(std::string_view url, std::string_view name);
+
+/// Is it this machine for certain? True for Unix sockets, 127.0.0.0/8, ::1 and `localhost`.
+[[nodiscard]] bool is_local(const net::Address& address);
+
+/// Why a link to another machine is refused; `word` allows it.
+[[nodiscard]] std::string not_encrypted(const net::Address& address, std::string_view word);
 
 }  // namespace gimnet::hub

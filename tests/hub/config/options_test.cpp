@@ -47,7 +47,10 @@ TEST(Options, DefaultsAreUseful) {
   EXPECT_TRUE(defaults.listen.empty());
   EXPECT_EQ(defaults.shards, default_shards());
   EXPECT_EQ(defaults.id, HubId{1});
-  EXPECT_EQ(defaults.name, "hub-1");
+  EXPECT_EQ(defaults.shown_name(), "hub-1");
+  EXPECT_FALSE(defaults.id_configured);
+  EXPECT_FALSE(defaults.links.accept);
+  EXPECT_TRUE(defaults.links.dial.empty());
   EXPECT_EQ(defaults.placement, Placement::spread);
   EXPECT_FALSE(defaults.insecure);
   EXPECT_FALSE(defaults.spin);
@@ -71,6 +74,7 @@ TEST(Options, ReadsEverything) {
   EXPECT_EQ(read.listen[1].text(), "unix:/some/path");
   EXPECT_EQ(read.shards, 2u);
   EXPECT_EQ(read.id, HubId{7});
+  EXPECT_TRUE(read.id_configured);
   EXPECT_EQ(read.name, "hall");
   EXPECT_EQ(read.state_dir, "/some/dir");
   EXPECT_EQ(read.limits.nodes, 10u);

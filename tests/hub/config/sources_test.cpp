@@ -81,7 +81,9 @@ TEST_F(SourcesTest, EveryKeyHasAVariable) {
   environment({"TCPHUB_LISTEN=unix:/a, unix:/b", "TCPHUB_SHARDS=2", "TCPHUB_HUB_ID=7",
                "TCPHUB_HUB_NAME=hall", "TCPHUB_STATE_DIR=/d", "TCPHUB_PLACEMENT=hint",
                "TCPHUB_SPIN=true", "TCPHUB_INSECURE=true", "TCPHUB_LOG_LEVEL=debug",
-               "TCPHUB_LIMITS_BUDGET_BYTES=64M"});
+               "TCPHUB_LIMITS_BUDGET_BYTES=64M", "TCPHUB_LINK=unix:/c tcp://127.0.0.1:1",
+               "TCPHUB_LINKS_ACCEPT_LINKS=true", "TCPHUB_LINKS_KEEP_ALIVE_MS=400",
+               "TCPHUB_LINKS_SILENT_MS=4000", "TCPHUB_LINKS_ALLOW=2,3"});
   EXPECT_THAT(warnings_, IsEmpty());
   const ReadConfiguration all = read();
   EXPECT_THAT(all.faults, IsEmpty());
@@ -89,6 +91,9 @@ TEST_F(SourcesTest, EveryKeyHasAVariable) {
   EXPECT_TRUE(all.configuration.options.spin);
   EXPECT_TRUE(all.configuration.options.insecure);
   EXPECT_EQ(all.configuration.options.limits.budget_bytes, 64ull << 20);
+  EXPECT_THAT(all.configuration.options.links.dial, SizeIs(2));
+  EXPECT_EQ(all.configuration.options.links.accepted,
+            (LinkTerms{400, 4'000, {HubId{2}, HubId{3}}}));
   EXPECT_EQ(all.configuration.origins.size(), settings().size() + 1);
 }
 
