@@ -1,6 +1,7 @@
 #include "hub/hub.hpp"
 
 #include <algorithm>
+#include <cstring>
 #include <vector>
 
 #include "base/clock.hpp"
@@ -134,9 +135,19 @@ struct Ground {
   std::vector<const SessionGauges*> readable_sessions;
 };
 
-HubFacts facts_of(const HubOptions& options) {
+/// As configured, with the hub id that it drew where none is.
+HubOptions identified(HubOptions options, const HubState& state) {
+  if (!options.id_configured && state.drawn_hub != kOwnHub) options.id = state.drawn_hub;
+  return options;
+}
+
+HubFacts facts_of(const HubOptions& options, const StartState& from) {
   HubFacts facts;
   facts.id = options.id;
+  facts.id_configured = options.id_configured;
+  std::memcpy(facts.unique.bytes.data(), from.start.state.unique_id.data(),
+              facts.unique.bytes.size());
+  facts.instance = from.instance;
   facts.name = options.shown_name();
   facts.version = kVersion;
   facts.shards = options.shards;
@@ -151,14 +162,14 @@ HubFacts facts_of(const HubOptions& options) {
 struct Hub::Parts {
   Parts(const HubOptions& given, const ConfigSources& sources, StartState from,
         std::vector<std::unique_ptr<Listener>> listeners)
-      : options(given),
+      : options(identified(given, from.start.state)),
         reloader(sources, given),
         limits(given.limits),
         state_folder(std::move(from.folder)),
         ground(options),
         shared(ground.shared(options)),
         shards(shared, {.spin = options.spin}),
-        conductor(facts_of(options), options.placement, limits,
+        conductor(facts_of(options, from), options.placement, limits,
                   Conductor::Wiring{shards,
                                     {ground.nodes, ground.groups, ground.quiescence},
                                     ground.readable,
@@ -213,7 +224,11 @@ Result<std::unique_ptr<Hub>> Hub::start(const HubOptions& options, const ConfigS
   }
   // After the addresses: a second hub by mistake is told that they are in use, which says more.
   const std::chrono::milliseconds wall{wall_now_ns() / 1'000'000};
-  Result<StartState> state = start_state({options.state_dir, options.id, urls.front(), wall});
+  Result<StartState> state =
+      start_state({.folder = options.state_dir,
+                   .draws_hub = !options.id_configured && !options.links.dial.empty(),
+                   .address = urls.front(),
+                   .wall = wall});
   if (!state) return state.error();
   std::unique_ptr<Hub> hub(
       new Hub(std::make_unique<Parts>(options, sources, std::move(*state), std::move(listeners))));

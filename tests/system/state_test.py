@@ -47,12 +47,12 @@ class Folder(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.path = folder.name
 
-    def test_the_default_one_is_for_hub_and_address_and_outlives_the_hub(self):
+    def test_the_default_one_is_for_an_address_and_outlives_the_hub(self):
         url = f"tcp://127.0.0.1:{free_port()}"
         env = {"XDG_STATE_HOME": self.path}
         first = PlainHub(self, "--listen", url, env=env).wait_ready()
         client = Client(self, first).join("K")
-        folder = os.path.join(self.path, "gimnet", f"hub-1-tcp-127.0.0.1-{first.port}")
+        folder = os.path.join(self.path, "gimnet", f"hub-tcp-127.0.0.1-{first.port}")
         self.assertEqual(sorted(os.listdir(folder)), ["lock", "state"])
         for name in ("lock", "state"):
             self.assertEqual(os.stat(os.path.join(folder, name)).st_mode & 0o777, 0o600)
@@ -61,6 +61,19 @@ class Folder(unittest.TestCase):
         newcomer = Client(self, second).join("Z")
         self.assertNotEqual(newcomer.id, client.id)
         self.assertEqual(Client(self, second).join("K", token=client.welcome[2]).id, client.id)
+
+    def test_the_hub_id_that_a_hub_with_links_draws_outlives_it(self):
+        def hub_of_a_node(*arguments):
+            hub = PlainHub(self, "--listen", "tcp://127.0.0.1:0", "--state-dir", f"{self.path}/state", *arguments)
+            found = Client(self, hub.wait_ready()).join("K").id >> 20
+            hub.kill()
+            return found
+        self.assertEqual(hub_of_a_node(), 1)
+        drawn = hub_of_a_node("--link", "unix:/nobody/listens")
+        self.assertTrue(1024 <= drawn <= 4094, drawn)
+        self.assertEqual(hub_of_a_node("--link", "unix:/nobody/listens"), drawn)
+        self.assertEqual(hub_of_a_node(), drawn)
+        self.assertEqual(hub_of_a_node("--hub-id", "7"), 7)
 
     def test_no_home_keeps_nobody_from_running_a_hub(self):
         url = f"tcp://127.0.0.1:{free_port()}"

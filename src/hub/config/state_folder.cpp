@@ -241,27 +241,36 @@ HubState new_state(bool known_first) {
   return state;
 }
 
-StartState in_memory(bool known_first) {
+void draw_if_needed(HubState& state, bool needed) {
+  if (!needed || state.drawn_hub != kOwnHub) return;
+  state.drawn_hub = draw_hub(random_bits(), [](HubId) { return false; });
+  log_info("the hub drew hub id " + std::to_string(state.drawn_hub.value()) +
+           ", since it links to others and none is configured; hub_id = N sets one");
+}
+
+StartState in_memory(bool known_first, bool draws_hub) {
   StartState result;
   result.start.state = new_state(known_first);
+  draw_if_needed(result.start.state, draws_hub);
   result.start.state.boot = 1;
   result.start.nodes.first = result.start.state.node_mark;
   result.start.groups.first = result.start.state.group_mark;
+  result.instance = proto::HubInstance{random_bits()};
   return result;
 }
 
 Result<StartState> go_on_from(std::unique_ptr<StateFolder> folder,
-                              const std::optional<HubState>& found,
-                              std::chrono::milliseconds wall) {
+                              const std::optional<HubState>& found, const StateWish& wish) {
   if (!found && folder->was_used()) {
     log_warning("there is no state in " + folder->path() +
                 " any more: the hub begins anew, and nodes that come back get new ids");
   }
-  Result<HubStart> start = next_start(found ? *found : new_state(!folder->was_used()), wall);
+  Result<HubStart> start = next_start(found ? *found : new_state(!folder->was_used()), wish.wall);
   if (!start)
     return Error{"cannot go on from " + folder->path() + "/state: " + start.error().sentence};
+  draw_if_needed(start->state, wish.draws_hub);
   if (const std::string error = folder->write(start->state); !error.empty()) return Error{error};
-  return StartState{std::move(*start), std::move(folder)};
+  return StartState{std::move(*start), proto::HubInstance{random_bits()}, std::move(folder)};
 }
 
 bool is_there(const std::string& path) {
@@ -269,18 +278,18 @@ bool is_there(const std::string& path) {
   return ::lstat(path.c_str(), &info) == 0 || errno != ENOENT;
 }
 
-StartState without_folder(const std::string& why) {
+StartState without_folder(const std::string& why, const StateWish& wish) {
   log_warning("the hub keeps nothing over a restart (" + why +
               "): nodes then get new ids; --state-dir DIR names a folder for its state");
-  return in_memory(false);
+  return in_memory(false, wish.draws_hub);
 }
 
 }  // namespace
 
-std::string state_folder_name(HubId hub, const ListenUrl& address) {
+std::string state_folder_name(const ListenUrl& address) {
   const bool tcp = address.scheme == ListenUrl::Scheme::tcp;
   if (tcp && address.port == 0) return {};
-  std::string name = "hub-" + std::to_string(hub.value()) + "-";
+  std::string name = "hub-";
   for (const char c :
        tcp ? "tcp-" + address.host + "-" + std::to_string(address.port) : "unix" + address.path) {
     const bool plain =
@@ -294,10 +303,10 @@ Result<StartState> start_state(const StateWish& wish) {
   const bool asked_for = !wish.folder.empty();
   std::string path = wish.folder;
   if (!asked_for) {
-    const std::string name = state_folder_name(wish.hub, wish.address);
-    if (name.empty()) return in_memory(true);
+    const std::string name = state_folder_name(wish.address);
+    if (name.empty()) return in_memory(true, wish.draws_hub);
     const Result<std::string> place = default_state_folder(name);
-    if (!place) return without_folder(place.error().sentence);
+    if (!place) return without_folder(place.error().sentence, wish);
     path = *place;
   }
   // A folder that was there may hold what another hub lives on, or what this one has to go on from.
@@ -305,14 +314,14 @@ Result<StartState> start_state(const StateWish& wish) {
   auto folder = StateFolder::open(path);
   if (!folder) {
     if (asked_for || was_there) return folder.error();
-    return without_folder(folder.error().sentence);
+    return without_folder(folder.error().sentence, wish);
   }
   const auto found = (*folder)->read();
   if (!found) return found.error();
   const bool was_used = (*folder)->was_used();
-  Result<StartState> result = go_on_from(std::move(*folder), *found, wish.wall);
+  Result<StartState> result = go_on_from(std::move(*folder), *found, wish);
   if (result || asked_for || *found || was_used) return result;
-  return without_folder(result.error().sentence);
+  return without_folder(result.error().sentence, wish);
 }
 
 }  // namespace gimnet::hub

@@ -13,7 +13,7 @@ namespace gimnet::hub {
 struct HubFacts {
   HubId id{1};
   bool id_configured = false;   ///< and not drawn, nor the default
-  proto::UniqueId unique;       ///< of its state folder; all 0: it has none yet
+  proto::UniqueId unique;       ///< of its state folder
   proto::HubInstance instance;  ///< of this start
   std::string name;
   std::string version;

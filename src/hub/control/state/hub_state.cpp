@@ -15,9 +15,9 @@ constexpr std::uint32_t kVersion = 4;
 constexpr const char* kNoHub = "it holds numbers that no hub writes";
 
 // Layout, little-endian: magic, u32 version, u32 number of kicked tokens, secret, unique id, u64
-// boot, u32 node mark, u32 group mark, u32 bytes of the set of used nodes, u32 0; 24 bytes for each
-// kicked token (u32 index, u32 0, u64 number, i64 expiry); the set (IndexSet::bytes()); SHA-256 of
-// all that.
+// boot, u32 node mark, u32 group mark, u32 bytes of the set of used nodes, u32 drawn hub id or 0;
+// 24 bytes for each kicked token (u32 index, u32 0, u64 number, i64 expiry); the set
+// (IndexSet::bytes()); SHA-256 of all that.
 constexpr std::size_t kVersionAt = 8;
 constexpr std::size_t kKickedCountAt = 12;
 constexpr std::size_t kSecretAt = 16;
@@ -26,7 +26,7 @@ constexpr std::size_t kBootAt = 64;
 constexpr std::size_t kNodeMarkAt = 72;
 constexpr std::size_t kGroupMarkAt = 76;
 constexpr std::size_t kNodesUsedBytesAt = 80;
-constexpr std::size_t kZeroAt = 84;
+constexpr std::size_t kDrawnHubAt = 84;
 constexpr std::size_t kHeadSize = 88;
 constexpr std::size_t kKickedSize = 24;
 constexpr std::size_t kSetBytesMax = IndexSet::bytes_max(kIndexMost);
@@ -48,6 +48,8 @@ SessionToken read_kicked(const std::byte* from) {
   return token;
 }
 
+bool may_be_drawn(std::uint32_t hub) { return hub >= kDrawnHubMin && hub <= kHubIdMax; }
+
 bool is_index(std::uint32_t index) { return index > 0 && index <= kIndexMost; }
 
 /// The numbers of a head; false: no hub writes these.
@@ -57,7 +59,9 @@ bool read_head(std::span<const std::byte> file, HubState& state) {
   state.boot = load_le<std::uint64_t>(file.data() + kBootAt);
   state.node_mark = load_le<std::uint32_t>(file.data() + kNodeMarkAt);
   state.group_mark = load_le<std::uint32_t>(file.data() + kGroupMarkAt);
-  return load_le<std::uint32_t>(file.data() + kZeroAt) == 0 && state.boot <= kBootMax &&
+  const auto drawn = load_le<std::uint32_t>(file.data() + kDrawnHubAt);
+  state.drawn_hub = HubId{static_cast<std::uint16_t>(drawn)};
+  return (drawn == 0 || may_be_drawn(drawn)) && state.boot <= kBootMax &&
          is_index(state.node_mark) && is_index(state.group_mark);
 }
 
@@ -87,6 +91,7 @@ std::vector<std::byte> write_hub_state(const HubState& state) {
   store_le(bytes.data() + kNodeMarkAt, state.node_mark);
   store_le(bytes.data() + kGroupMarkAt, state.group_mark);
   store_le(bytes.data() + kNodesUsedBytesAt, static_cast<std::uint32_t>(nodes_used.size()));
+  store_le(bytes.data() + kDrawnHubAt, std::uint32_t{state.drawn_hub.value()});
   std::byte* at = bytes.data() + kHeadSize;
   for (const SessionToken& token : state.kicked) {
     write_kicked(at, token);
@@ -126,6 +131,15 @@ Result<HubState> read_hub_state(std::span<const std::byte> bytes) {
   if (!used) return Error{kNoHub};
   state.nodes_used = std::move(*used);
   return state;
+}
+
+HubId draw_hub(std::uint64_t random, const std::function<bool(HubId)>& taken) {
+  constexpr std::uint64_t kCount = kHubIdMax - kDrawnHubMin + 1;
+  for (std::uint64_t i = 0; i < kCount; ++i) {
+    const HubId hub{static_cast<std::uint16_t>(kDrawnHubMin + (random % kCount + i) % kCount)};
+    if (!taken(hub)) return hub;
+  }
+  return kOwnHub;
 }
 
 Result<HubStart> next_start(const HubState& found, std::chrono::milliseconds wall) {

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -23,6 +24,7 @@ struct HubState {
   std::uint64_t boot = 0;                 ///< counts the starts, from 1
   std::uint32_t node_mark = 1;            ///< the next start hands out node indices from here
   std::uint32_t group_mark = 1;           ///< the same for groups
+  HubId drawn_hub;                        ///< that the hub drew, having none configured; 0: none
   IndexSet nodes_used;                    ///< node indices that the next start must not hand out
   std::vector<SessionToken> kicked;       ///< not honoured any more
   friend bool operator==(const HubState&, const HubState&) = default;
@@ -37,6 +39,12 @@ inline constexpr std::size_t kHubStateBytesMax =
 /// The file is not trusted: whatever it holds is read as written above or refused. Errors: what is
 /// wrong with it, as the end of a sentence about the file.
 [[nodiscard]] Result<HubState> read_hub_state(std::span<const std::byte> bytes);
+
+/// Hub ids below are left to those who configure them.
+inline constexpr std::uint16_t kDrawnHubMin = 1024;
+
+/// A hub id that is not taken, from kDrawnHubMin on, chosen by `random`. 0: all are taken.
+[[nodiscard]] HubId draw_hub(std::uint64_t random, const std::function<bool(HubId)>& taken);
 
 /// A start of the hub: what has to be kept before it begins, and what newcomers may be given.
 struct HubStart {

@@ -18,6 +18,7 @@ HubState some_state() {
   state.boot = 9;
   state.node_mark = 8'193;
   state.group_mark = 4'097;
+  state.drawn_hub = HubId{1'024};
   state.kicked = {{NodeIndex{3}, 77, 5s}, {NodeIndex{1'048'574}, 78, 6s}};
   for (std::uint32_t index = 1; index < state.node_mark; ++index) state.nodes_used.insert(index);
   state.nodes_used.insert(8'200);
@@ -92,9 +93,9 @@ TEST(HubState, SaysWhatIsWrong) {
     store_le(wrong.data() + length, 0xFFFF'FFFFu);
     EXPECT_THAT(fault_of(sealed(wrong)), HasSubstr("length")) << length;
   }
-  for (const std::size_t unused : {84u, 87u, 92u, 95u}) {
+  for (const std::size_t unused : {85u, 87u, 92u, 95u}) {
     wrong = bytes;
-    wrong[unused] = std::byte{1};
+    wrong[unused] = std::byte{1};  // of 84: hub 257, or more than a hub id
     EXPECT_THAT(fault_of(sealed(wrong)), HasSubstr("numbers")) << unused;
   }
   const std::size_t nodes_used = 88 + 2 * 24;
@@ -107,6 +108,25 @@ TEST(HubState, SaysWhatIsWrong) {
   wrong = bytes;
   store_le(wrong.data() + 64, kBootMax + 1);
   EXPECT_THAT(fault_of(sealed(wrong)), HasSubstr("numbers"));
+}
+
+TEST(HubState, OnlyAHubIdThatCanBeDrawnIsRead) {
+  for (const std::uint32_t hub : {0u, 1'024u, 4'094u, 1u, 1'023u, 4'095u, 66'560u}) {
+    std::vector<std::byte> bytes = write_hub_state(some_state());
+    store_le(bytes.data() + 84, hub);
+    const bool right = hub == 0 || (hub >= kDrawnHubMin && hub <= kHubIdMax);
+    EXPECT_EQ(fault_of(sealed(bytes)).empty(), right) << hub;
+  }
+}
+
+TEST(HubState, DrawsAHubIdThatIsNotTaken) {
+  const auto none = [](HubId) { return false; };
+  EXPECT_EQ(draw_hub(0, none), HubId{1'024});
+  EXPECT_EQ(draw_hub(3'070, none), HubId{4'094});
+  EXPECT_EQ(draw_hub(3'071, none), HubId{1'024});
+  EXPECT_EQ(draw_hub(3'070, [](HubId hub) { return hub > HubId{1'030} || hub < HubId{1'026}; }),
+            HubId{1'026});
+  EXPECT_EQ(draw_hub(5, [](HubId) { return true; }), kOwnHub);
 }
 
 TEST(HubState, TheNextStartHandsOutWhatIsAboveTheMarks) {
