@@ -41,6 +41,16 @@ function(gimnet_test source)
     PROPERTIES TIMEOUT 120 LABELS unit ENVIRONMENT "XDG_RUNTIME_DIR=${GIMNET_TEST_RUNTIME}")
 endfunction()
 
+# gimnet_toy_stream_test(TEST [EXCEPT Subject.Behaviour ...]): a test once more, over streams that keep
+# bytes of their own (tests/net/support/toy_stream.hpp).
+function(gimnet_toy_stream_test name)
+  cmake_parse_arguments(ARG "" "" "EXCEPT" ${ARGN})
+  string(REPLACE ";" ":" _except "${ARG_EXCEPT}")
+  add_test(NAME ${name}.over_toy_streams COMMAND ${name} --gtest_brief=1 --gtest_filter=-${_except})
+  set_tests_properties(${name}.over_toy_streams PROPERTIES TIMEOUT 240 LABELS unit
+    ENVIRONMENT "GIMNET_TEST_STREAM=toy;XDG_RUNTIME_DIR=${GIMNET_TEST_RUNTIME}")
+endfunction()
+
 # gimnet_bench(FILE_bench.cpp DEPENDS lib ...): a Google Benchmark binary; ctest runs it once, briefly, so that it cannot rot.
 function(gimnet_bench source)
   cmake_parse_arguments(ARG "" "" "DEPENDS" ${ARGN})

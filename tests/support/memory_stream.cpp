@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "base/check.hpp"
+#include "tests/net/support/toy_stream.hpp"
 
 namespace gimnet::hub {
 namespace {
@@ -16,6 +17,9 @@ class ByteQueue {
     bytes_.insert(bytes_.end(), bytes, bytes + size);
   }
   [[nodiscard]] std::size_t size() const { return bytes_.size() - begin_; }
+  [[nodiscard]] std::span<const std::byte> bytes() const {
+    return std::span(bytes_).subspan(begin_);
+  }
   /// REQUIRES: size <= size().
   const std::byte* take(std::size_t size) {
     const std::byte* taken = bytes_.data() + begin_;
@@ -64,6 +68,9 @@ struct MemoryPipe {
   bool failed = false;
   bool shut_down = false;
   bool gone = false;
+  bool toy = false;
+  net::ToyCode code;               ///< of the records to the peer
+  std::vector<std::byte> decoded;  ///< for the peer, not read yet
 
   [[nodiscard]] std::size_t free_room() const { return room - std::min(room, to_peer.size()); }
 };
@@ -119,17 +126,41 @@ void MemoryStream::limit_unacknowledged(std::uint32_t ms) { pipe_->unacknowledge
 MemoryPeer::MemoryPeer(std::shared_ptr<MemoryPipe> pipe) : pipe_(std::move(pipe)) {}
 
 void MemoryPeer::write(std::span<const std::byte> bytes) {
-  pipe_->to_hub.append(bytes.data(), bytes.size());
+  if (!pipe_->toy) return pipe_->to_hub.append(bytes.data(), bytes.size());
+  const auto own = net::ToyCode::own_record();
+  pipe_->to_hub.append(own.data(), own.size());
+  const std::vector<std::byte> records = net::ToyCode::encode(bytes);
+  pipe_->to_hub.append(records.data(), records.size());
 }
 
 std::size_t MemoryPeer::read(std::vector<std::byte>& into, std::size_t most) {
+  if (pipe_->toy) return read_records(into, most);
   const std::size_t size = std::min(most, pipe_->to_peer.size());
   const std::byte* bytes = pipe_->to_peer.take(size);
   into.insert(into.end(), bytes, bytes + size);
   return size;
 }
 
-std::size_t MemoryPeer::readable() const { return pipe_->to_peer.size(); }
+std::size_t MemoryPeer::read_records(std::vector<std::byte>& into, std::size_t most) {
+  std::vector<std::byte>& decoded = pipe_->decoded;
+  while (decoded.size() < most && pipe_->to_peer.size() != 0) {
+    const std::size_t size = std::min(net::ToyCode::kRecord, pipe_->to_peer.size());
+    pipe_->code.decode({pipe_->to_peer.take(size), size}, decoded);
+  }
+  const std::size_t size = std::min(most, decoded.size());
+  const auto end = decoded.begin() + static_cast<std::ptrdiff_t>(size);
+  into.insert(into.end(), decoded.begin(), end);
+  decoded.erase(decoded.begin(), end);
+  return size;
+}
+
+std::size_t MemoryPeer::readable() const {
+  if (!pipe_->toy) return pipe_->to_peer.size();
+  net::ToyCode code = pipe_->code;
+  std::vector<std::byte> decoded = pipe_->decoded;
+  code.decode(pipe_->to_peer.bytes(), decoded);
+  return decoded.size();
+}
 
 void MemoryPeer::close() { pipe_->closed = true; }
 
@@ -164,9 +195,12 @@ std::uint32_t MemoryPeer::unacknowledged_limit() const { return pipe_->unacknowl
 
 std::uint64_t MemoryPeer::send_calls() const { return pipe_->send_calls; }
 
-std::pair<std::unique_ptr<MemoryStream>, MemoryPeer> make_memory_pipe() {
+std::pair<std::unique_ptr<net::Stream>, MemoryPeer> make_memory_pipe() {
   auto pipe = std::make_shared<MemoryPipe>();
-  return {std::make_unique<MemoryStream>(pipe), MemoryPeer(pipe)};
+  pipe->toy = net::toy_streams_wanted();
+  std::unique_ptr<net::Stream> stream = std::make_unique<MemoryStream>(pipe);
+  if (pipe->toy) stream = std::make_unique<net::ToyStream>(std::move(stream));
+  return {std::move(stream), MemoryPeer(pipe)};
 }
 
 }  // namespace gimnet::hub

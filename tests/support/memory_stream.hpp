@@ -79,10 +79,13 @@ class MemoryPeer {
   [[nodiscard]] std::uint64_t send_calls() const;
 
  private:
+  std::size_t read_records(std::vector<std::byte>& into, std::size_t most);
+
   std::shared_ptr<MemoryPipe> pipe_;
 };
 
-/// Both ends of a new pipe.
-[[nodiscard]] std::pair<std::unique_ptr<MemoryStream>, MemoryPeer> make_memory_pipe();
+/// Both ends of a new pipe. Where toy streams are wanted (tests/net/support) the hub's end is one
+/// over the pipe, and the other end speaks its records: room, plans and faults count those.
+[[nodiscard]] std::pair<std::unique_ptr<net::Stream>, MemoryPeer> make_memory_pipe();
 
 }  // namespace gimnet::hub

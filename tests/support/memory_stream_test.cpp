@@ -18,12 +18,12 @@ std::string read_all(MemoryPeer& peer) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-net::IoResult send(MemoryStream& transport, std::string text) {
+net::IoResult send(net::Stream& transport, std::string text) {
   const iovec piece{text.data(), text.size()};
   return transport.send({&piece, 1});
 }
 
-std::string receive(MemoryStream& transport, std::size_t most = 64) {
+std::string receive(net::Stream& transport, std::size_t most = 64) {
   std::vector<std::byte> bytes(most);
   const net::IoResult result = transport.receive(bytes);
   return {reinterpret_cast<const char*>(bytes.data()), result.bytes};

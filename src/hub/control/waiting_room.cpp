@@ -58,15 +58,22 @@ void WaitingRoom::enter(Stranger stranger, milliseconds now) {
   if (!address.empty()) join_crowd(peer, address);
   peer.handshake = std::make_unique<net::AcceptHandshake>(limits_.handshake_bytes);
   peer.deadline = now + milliseconds{limits_.handshake_ms};
-  epoll_event event{};
-  event.events = EPOLLIN;
-  event.data.ptr = &peer;
-  const int descriptor = peer.stranger.transport->descriptor();
-  GIMNET_CHECK(descriptor >= 0);
-  if (::epoll_ctl(poll_, EPOLL_CTL_ADD, descriptor, &event) != 0) {
+  GIMNET_CHECK(peer.stranger.transport->descriptor() >= 0);
+  if (!arm(peer, EPOLL_CTL_ADD)) {
     turn_away(peer, {GoodbyeCode::no_memory, "the hub is out of memory; try again later"}, now);
   }
   keep_leaving_few();
+}
+
+bool WaitingRoom::arm(Peer& peer, int operation) {
+  const net::Stream& stream = *peer.stranger.transport;
+  const net::Interest wanted = net::interest_of(true, false, stream.pending_out());
+  if (operation == EPOLL_CTL_MOD && wanted == peer.armed) return true;
+  peer.armed = wanted;
+  epoll_event event{};
+  event.events = wanted.write ? EPOLLIN | EPOLLOUT : EPOLLIN;
+  event.data.ptr = &peer;
+  return ::epoll_ctl(poll_, operation, stream.descriptor(), &event) == 0;
 }
 
 void WaitingRoom::make_place_for(std::string_view address, milliseconds now) {
@@ -106,7 +113,14 @@ bool WaitingRoom::serve(milliseconds now) {
   const int count = ::epoll_wait(poll_, events.data(), kBatch, 0);
   for (int i = 0; i < count; ++i) {
     // Each event removes its own peer only, so none of the batch is stale.
-    Peer& peer = *static_cast<Peer*>(events[static_cast<std::size_t>(i)].data.ptr);
+    const epoll_event& event = events[static_cast<std::size_t>(i)];
+    Peer& peer = *static_cast<Peer*>(event.data.ptr);
+    if ((event.events & EPOLLOUT) != 0) {
+      // A stream that failed tells so when it is read.
+      static_cast<void>(peer.stranger.transport->send({}));
+      static_cast<void>(arm(peer, EPOLL_CTL_MOD));
+      if ((event.events & ~std::uint32_t{EPOLLOUT}) == 0) continue;
+    }
     if (peer.handshake != nullptr) {
       read(peer, now);
     } else {
@@ -150,14 +164,16 @@ std::optional<milliseconds> WaitingRoom::next_deadline() const {
 
 void WaitingRoom::read(Peer& peer, milliseconds now) {
   const net::IoResult result = peer.stranger.transport->receive(peer.handshake->room());
-  if (result.status == net::IoStatus::would_block) return;
+  if (result.status == net::IoStatus::would_block)
+    return static_cast<void>(arm(peer, EPOLL_CTL_MOD));
   if (result.status != net::IoStatus::ok) {
     if (peer.handshake->begun()) refusals_.unfinished.add(1);
     return remove(peer);
   }
   switch (peer.handshake->took(result.bytes)) {
     case net::AcceptHandshake::Verdict::more:
-      return;
+      if (peer.stranger.transport->pending_in() != 0) return read(peer, now);
+      return static_cast<void>(arm(peer, EPOLL_CTL_MOD));
     case net::AcceptHandshake::Verdict::hello:
       return judge(peer, now);
     case net::AcceptHandshake::Verdict::refused: {
@@ -182,10 +198,7 @@ void WaitingRoom::judge(Peer& peer, milliseconds now) {
     waiting_.erase(peer.self);
     return;
   }
-  epoll_event event{};
-  event.events = EPOLLIN;
-  event.data.ptr = &peer;
-  ::epoll_ctl(poll_, EPOLL_CTL_ADD, peer.stranger.transport->descriptor(), &event);
+  static_cast<void>(arm(peer, EPOLL_CTL_ADD));
   turn_away(peer, *refusal, now);
 }
 
@@ -223,10 +236,14 @@ Acceptor::Room WaitingRoom::give_way_to(const Stranger& newcomer) {
 
 void WaitingRoom::discard(Peer& peer) {
   std::array<std::byte, 4'096> nobody_looks{};
-  const net::IoResult result = peer.stranger.transport->receive(nobody_looks);
-  if (result.status == net::IoStatus::would_block) return;
-  peer.discarded += result.bytes;
-  if (result.status != net::IoStatus::ok || peer.discarded > kDiscardedMax) remove(peer);
+  net::Stream& stream = *peer.stranger.transport;
+  do {
+    const net::IoResult result = stream.receive(nobody_looks);
+    if (result.status == net::IoStatus::would_block) break;
+    peer.discarded += result.bytes;
+    if (result.status != net::IoStatus::ok || peer.discarded > kDiscardedMax) return remove(peer);
+  } while (stream.pending_in() != 0);
+  static_cast<void>(arm(peer, EPOLL_CTL_MOD));
 }
 
 void WaitingRoom::turn_away(Peer& peer, const Goodbye& goodbye, milliseconds now) {
@@ -241,6 +258,7 @@ void WaitingRoom::turn_away(Peer& peer, const Goodbye& goodbye, milliseconds now
   peer.handshake.reset();
   leaving_.splice(leaving_.end(), waiting_, peer.self);
   begin_leaving(peer, now);
+  static_cast<void>(arm(peer, EPOLL_CTL_MOD));
 }
 
 void WaitingRoom::keep_leaving_few() {
@@ -253,12 +271,9 @@ void WaitingRoom::see_off(std::unique_ptr<net::Stream> transport, milliseconds n
   Peer& peer = leaving_.emplace_back();
   peer.self = std::prev(leaving_.end());
   peer.stranger.transport = std::move(transport);
-  epoll_event event{};
-  event.events = EPOLLIN;
-  event.data.ptr = &peer;
-  // Without a place in the poll set it is closed at its deadline all the same.
-  ::epoll_ctl(poll_, EPOLL_CTL_ADD, peer.stranger.transport->descriptor(), &event);
   begin_leaving(peer, now);
+  // Without a place in the poll set it is closed at its deadline all the same.
+  static_cast<void>(arm(peer, EPOLL_CTL_ADD));
   keep_leaving_few();
 }
 

@@ -72,6 +72,7 @@ class WaitingRoom {
     std::unique_ptr<net::AcceptHandshake> handshake;  ///< null: leaving
     std::chrono::milliseconds deadline{};
     std::size_t discarded = 0;
+    net::Interest armed;
     Peers::iterator self;
     std::optional<Crowds::iterator> crowd;  ///< while it waits; none: not counted by address
     Crowd::iterator in_crowd;
@@ -83,6 +84,8 @@ class WaitingRoom {
   void make_place_for(std::string_view address, std::chrono::milliseconds now);
   void join_crowd(Peer& peer, std::string_view address);
   void leave_crowd(Peer& peer);
+  /// False: there is no place in the poll set.
+  bool arm(Peer& peer, int operation);
   void read(Peer& peer, std::chrono::milliseconds now);
   void discard(Peer& peer);
   void begin_leaving(Peer& peer, std::chrono::milliseconds now);

@@ -36,6 +36,7 @@ void Attacher::attach(AttachCommand command) {
   connection.tail_since_ms = 0;
   connection.ingress = IngressState{};
   connection.read_again = Backoff{};
+  connection.goes_on = false;
   connection.ingress.node = connection.node;
   connection.posted_shards = kAllShards;
   state_.counters.connections.add(1);
@@ -172,6 +173,9 @@ void Attacher::welcome(Connection& connection, const proto::Welcome& welcome, st
     send_flow(state_, connection, proto::flow::Skip{proto::DropReason::link_lost, gap});
   }
   state_.recipients.mark_dirty(connection);
+  state_.signals.arm(connection);
+  // The stream may have read on behind HELLO, which no poller shows.
+  state_.go_on_later(connection);
 }
 
 }  // namespace gimnet::hub

@@ -58,6 +58,7 @@ struct Connection : Recipient {
   bool must_confirm = false;  ///< nothing more can be written before its CONFIRM: read even if held
   bool gauged = false;        ///< its queue gauge is not 0
   bool missed_resume = false;  ///< RESUME had no place: it would stay paused for ever
+  bool goes_on = false;        ///< its token stands in with_rest
   Backoff read_again;          ///< of reading it twice in a turn
   std::uint32_t attachment = 0;
   std::uint32_t holds = 0;     ///< by outboxes

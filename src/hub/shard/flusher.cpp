@@ -50,6 +50,7 @@ void Flusher::flush(Connection& connection) {
   const Flush result = connection.writer.flush(
       connection.outbox, connection.resume ? &connection.resume->kept : nullptr,
       *connection.transport, state_.egress);
+  if (connection.transport->pending_out() != 0) state_.signals.arm(connection);
   const std::uint64_t sent = state_.tally.sent_bytes - sent_before;
   const bool sent_data = sent != state_.tally.sent_control_bytes - control_before;
   if (const bool must_confirm = result == Flush::waits; must_confirm != connection.must_confirm) {
@@ -102,7 +103,8 @@ void Flusher::on_emptied(Connection& connection) {
   connection.outbox.on_emptied(state_.egress);
   connection.outbox.signal_room(state_.egress);
   if (std::exchange(connection.gauged, false)) state_.sessions.set_queued(connection.slot, 0);
-  if (connection.gate.has(ReadGate::draining) && state_.nothing_follows) {
+  if (connection.gate.has(ReadGate::draining) && state_.nothing_follows &&
+      connection.transport->pending_out() == 0) {
     closer_.close(connection, proto::GoodbyeCode::draining, "the hub is shutting down");
   }
 }
@@ -153,6 +155,11 @@ void Flusher::tell_losses(Connection& connection) {
 }
 
 void Flusher::on_writable(Connection& connection) {
+  if (connection.transport->pending_out() != 0) {
+    const net::IoStatus status = connection.transport->send({}).status;
+    if (status == net::IoStatus::failed) return on_write_failed(connection);
+    if (status == net::IoStatus::would_block) return;
+  }
   connection.write = WriteState::open;
   state_.signals.arm(connection);
   state_.recipients.mark_dirty(connection);

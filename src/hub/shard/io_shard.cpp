@@ -181,8 +181,7 @@ void IoShard::serve(std::span<const Ready> ready) {
     }
     Connection* connection = state_.find_token(each.token);
     if (connection == nullptr) continue;
-    if (each.writable && connection->write == WriteState::blocked)
-      flusher_.on_writable(*connection);
+    if (each.writable && connection->armed.write) flusher_.on_writable(*connection);
     if (each.readable && connection->armed.read) reader_.read(*connection);
     if (state_.tally.received_bytes - flushed_at >= kReadBytesPerFlush) {
       flush();
@@ -195,11 +194,14 @@ void IoShard::serve(std::span<const Ready> ready) {
 void IoShard::go_on() {
   for (const std::uint64_t token : going_on_) {
     Connection* connection = state_.find_token(token);
-    if (connection == nullptr || !connection->gate.has(ReadGate::rest)) continue;
-    if (connection->armed.read) {
+    if (connection == nullptr) continue;
+    connection->goes_on = false;
+    if (!connection->armed.read) {
+      state_.go_on_later(*connection);
+    } else if (connection->gate.has(ReadGate::rest)) {
       reader_.go_on(*connection);
     } else {
-      state_.with_rest.push_back(token);
+      reader_.read(*connection);
     }
   }
   going_on_.clear();

@@ -46,7 +46,7 @@ std::uint64_t Reader::share() const {
   if ((posted & state_.fanout.crowded()) != 0) return wait_for_room(connection);
 }
 
-void Reader::read(Connection& connection) {
+void Reader::read_some(Connection& connection) {
   state_.egress.owner.check_here();
   if (connection.gate.has(ReadGate::rest)) return;
   std::uint64_t most =
@@ -69,13 +69,14 @@ void Reader::read(Connection& connection) {
 
 void Reader::go_on(Connection& connection) {
   if ((connection.posted_shards & state_.fanout.crowded()) != 0) {
-    state_.with_rest.push_back(connection.token());
+    state_.go_on_later(connection);
     return wait_for_room(connection);
   }
   // It may have said more, which is not read before this is done.
   if (connection.write != WriteState::failed) connection.last_heard_ms = state_.now_ms;
   connection.gate.clear(ReadGate::rest);
   route_all(connection, state_.receive_buffer.go_on(connection.tail));
+  look_at_stream(connection);
 }
 
 void Reader::wait_for_room(Connection& connection) {
@@ -126,7 +127,7 @@ bool Reader::process(Connection& connection, ReceiveBuffer::Received received) {
 void Reader::keep_rest(Connection& connection, std::span<const std::byte> rest) {
   state_.receive_buffer.keep_rest(connection.tail, rest.data(), rest.data() + rest.size());
   connection.gate.shut(ReadGate::rest);
-  state_.with_rest.push_back(connection.token());
+  state_.go_on_later(connection);
 }
 
 /// Closed itself, a newcomer would pay for those who begin frames and never end them.

@@ -13,7 +13,10 @@ class Reader {
 
   /// Reads what is there, up to one turn's share, and routes it, up to another. The connection may
   /// be closed by it. Does nothing while it has a rest.
-  void read(Connection& connection);
+  void read(Connection& connection) {
+    read_some(connection);
+    look_at_stream(connection);
+  }
   /// Routes the rest of what was read in an earlier turn, up to a turn's share. As read().
   /// REQUIRES: it has one.
   void go_on(Connection& connection);
@@ -31,6 +34,13 @@ class Reader {
  private:
   /// Not read until the shards that it sends to have room.
   void wait_for_room(Connection& connection);
+  void read_some(Connection& connection);
+  /// A stream that was read may keep bytes that no poller shows, and may have made some to send.
+  void look_at_stream(Connection& connection) {
+    if (!connection.connected) return;
+    if (connection.transport->pending_in() != 0) state_.go_on_later(connection);
+    if (connection.transport->pending_out() != 0) state_.signals.arm(connection);
+  }
   void route_all(Connection& connection, ReceiveBuffer::Received received);
   /// The turn's share is used up: [begin of a whole frame, end) waits for another turn.
   void keep_rest(Connection& connection, std::span<const std::byte> rest);

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <memory>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "base/ids.hpp"
@@ -70,7 +71,8 @@ struct ShardState {
   std::vector<std::unique_ptr<Connection>> connections;  ///< by slot
   std::vector<Connection*> waiting_for_room;
   std::vector<std::uint64_t>
-      with_rest;  ///< tokens of connections whose last read was not routed whole, by age
+      with_rest;  ///< tokens of connections that go on without the poller, by age: their last read
+                  ///< was not routed whole, their stream keeps bytes, or they have just come
   std::uint64_t now_ms = 0;
   std::uint64_t done_shards = 0;  ///< bit set: they drain, and what they had handed over was taken
   bool nothing_follows =
@@ -86,6 +88,10 @@ struct ShardState {
     return connection != nullptr && connection->connected && connection->token() == token
                ? connection
                : nullptr;
+  }
+  /// The next turn goes on with the connection, whatever the poller says.
+  void go_on_later(Connection& connection) {
+    if (!std::exchange(connection.goes_on, true)) with_rest.push_back(connection.token());
   }
   void tell_conductor(ShardEvent event) { shared.inbox.push(std::move(event)); }
 };

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <string>
 #include <thread>
 
@@ -42,8 +43,9 @@ TEST(NifWatch, TakesANameAndSaysWhetherItIsProvisional) {
   FakeHub hub;
   Connected connected = connect_to(hub, default_options(), make_welcome());
   nif_node* const node = connected.node.get();
+  std::atomic<bool> has_name{false};
   converse(
-      [node] {
+      [node, &has_name] {
         std::uint8_t provisional = 0;
         EXPECT_EQ(nif_register(node, "forklift", &provisional, NIF_FOREVER), NIF_OK);
         EXPECT_EQ(provisional, 1);
@@ -51,6 +53,7 @@ TEST(NifWatch, TakesANameAndSaysWhetherItIsProvisional) {
         info.struct_size = sizeof info;
         EXPECT_EQ(nif_get_info(node, &info), NIF_OK);
         EXPECT_STREQ(info.name, "forklift");
+        has_name = true;
         nif_incoming in{};
         ASSERT_EQ(nif_receive(node, &in, NIF_FOREVER), NIF_OK);
         EXPECT_EQ(in.type, static_cast<std::uint32_t>(NIF_NAME_LOST));
@@ -68,6 +71,7 @@ TEST(NifWatch, TakesANameAndSaysWhetherItIsProvisional) {
         connected.hub.send_control(
             proto::Kind::ns,
             proto::encode_answer(ns::RegisterNameAnswer{"forklift", true, {std::byte{1}}}, number));
+        while (!has_name) std::this_thread::yield();
         connected.hub.send_control(
             proto::Kind::ns, proto::encode(ns::NameLost{"forklift", NodeId{kPeerId}, "late"}));
       });

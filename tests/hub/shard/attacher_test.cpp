@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "tests/hub/shard/support/hub_rig.hpp"
+#include "tests/net/support/toy_stream.hpp"
 
 namespace gimnet::hub {
 namespace {
@@ -354,6 +355,30 @@ TEST(Attacher, WhoCannotBePolledHearsWhyBehindTheOpening) {
   EXPECT_EQ(node.goodbye->code, proto::GoodbyeCode::no_memory);
   EXPECT_EQ(rig.sum(&ShardCounters::no_memory), 1u);
   EXPECT_EQ(rig.sum(&ShardCounters::connections), 0u);
+}
+
+// A stream that encrypts may have read on behind HELLO, and no poller shows that.
+TEST(Attacher, ReadsTheBytesThatTheStreamKept) {
+  HubRig rig;
+  FakeNode& b = rig.join(0);
+  auto [pipe, peer] = make_memory_pipe();
+  auto stream = std::make_unique<net::ToyStream>(std::move(pipe));
+  FakeNode a;
+  a.id = make_id<NodeId>(rig.hub(), 3);
+  std::vector<std::byte> bytes = rig.frame(a, b.id.value(), "kept", {});
+  bytes.insert(bytes.begin(), std::byte{1});
+  peer.write(net::ToyCode::encode(bytes));
+  std::array<std::byte, 1> hello;
+  ASSERT_EQ(stream->receive(hello).bytes, 1u);
+  EXPECT_EQ(stream->pending_in(), bytes.size() - 1);
+  AttachCommand command;
+  command.session = {ConnectionSlot{3}, 9};
+  command.attachment = 1;
+  command.node = a.id;
+  command.transport = std::move(stream);
+  rig.command(0, std::move(command));
+  rig.settle();
+  EXPECT_THAT(b.texts(), ::testing::ElementsAre("kept"));
 }
 
 }  // namespace

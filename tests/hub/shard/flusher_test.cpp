@@ -3,7 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+
 #include "tests/hub/shard/support/hub_rig.hpp"
+#include "tests/net/support/toy_stream.hpp"
 
 namespace gimnet::hub {
 namespace {
@@ -14,6 +17,15 @@ using ::testing::ElementsAre;
 using testing::FakeNode;
 using testing::HubRig;
 using ::testing::SizeIs;
+
+/// A node whose stream keeps bytes of its own.
+FakeNode& join_over_a_toy_stream(HubRig& rig) {
+  const bool already = net::toy_streams_wanted();
+  ::setenv("GIMNET_TEST_STREAM", "toy", 1);
+  FakeNode& node = rig.join(0);
+  if (!already) ::unsetenv("GIMNET_TEST_STREAM");
+  return node;
+}
 
 constexpr std::uint8_t kLatestKeyed =
     static_cast<std::uint8_t>(proto::Policy::latest) | proto::kFlagKeyed;
@@ -40,6 +52,21 @@ TEST(Flusher, GoesOnWhereTheTransportStopped) {
     rig.settle();
     EXPECT_THAT(b.texts(), ElementsAre("0", "1", "2", "3", "4")) << "room " << room;
   }
+}
+
+TEST(Flusher, WaitsForTheKernelToTakeWhatTheStreamTook) {
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  FakeNode& b = join_over_a_toy_stream(rig);
+  // Two records: of the second one the kernel takes a part.
+  b.pipe.plan_sends({2 * net::ToyCode::kRecord - 1});
+  rig.send(a, b.id.value(), "whole");
+  rig.turn();
+  EXPECT_TRUE(rig.connection(b)->outbox.empty());
+  EXPECT_TRUE(rig.connection(b)->armed.write);
+  rig.settle();
+  EXPECT_THAT(b.texts(), ElementsAre("whole"));
+  EXPECT_FALSE(rig.connection(b)->armed.write);
 }
 
 TEST(Flusher, TheNextOneThatWaitsTakesNoNewMemoryToBeWatched) {

@@ -40,12 +40,15 @@ std::optional<proto::flow::Message> Frame::flow() const {
 }
 
 FakeConnection::FakeConnection(FakeConnection&& other) noexcept
-    : descriptor_(std::exchange(other.descriptor_, -1)), buffer_(std::move(other.buffer_)) {}
+    : descriptor_(std::exchange(other.descriptor_, -1)),
+      buffer_(std::move(other.buffer_)),
+      code_(other.code_) {}
 
 FakeConnection& FakeConnection::operator=(FakeConnection&& other) noexcept {
   close();
   descriptor_ = std::exchange(other.descriptor_, -1);
   buffer_ = std::move(other.buffer_);
+  code_ = other.code_;
   return *this;
 }
 
@@ -60,7 +63,12 @@ bool FakeConnection::fill(std::size_t bytes) {
     std::array<std::byte, 65536> memory;
     const ssize_t received = ::recv(descriptor_, memory.data(), memory.size(), 0);
     if (received <= 0) return false;
-    buffer_.insert(buffer_.end(), memory.begin(), memory.begin() + received);
+    const auto got = std::span(memory).first(static_cast<std::size_t>(received));
+    if (net::toy_streams_wanted()) {
+      code_.decode(got, buffer_);
+    } else {
+      buffer_.insert(buffer_.end(), got.begin(), got.end());
+    }
   }
   return true;
 }
@@ -114,6 +122,12 @@ void FakeConnection::goodbye(proto::GoodbyeCode code, const std::string& sentenc
 }
 
 void FakeConnection::send(std::span<const std::byte> bytes) {
+  if (!net::toy_streams_wanted()) return send_raw(bytes);
+  send_raw(net::ToyCode::own_record());
+  send_raw(net::ToyCode::encode(bytes));
+}
+
+void FakeConnection::send_raw(std::span<const std::byte> bytes) {
   while (!bytes.empty()) {
     const ssize_t sent = ::send(descriptor_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
     if (sent <= 0) return;  // the node closed: what it then does is what the test looks at

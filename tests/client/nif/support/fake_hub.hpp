@@ -16,6 +16,7 @@
 #include "proto/frame/flow.hpp"
 #include "proto/frame/frame_builder.hpp"
 #include "proto/frame/frame_parser.hpp"
+#include "tests/net/support/toy_stream.hpp"
 
 // A hub that says exactly what a test wants it to say, over a real socket on loopback.
 
@@ -87,8 +88,10 @@ class FakeConnection {
 
  private:
   [[nodiscard]] bool fill(std::size_t bytes);
+  void send_raw(std::span<const std::byte> bytes);
   int descriptor_ = -1;
   std::vector<std::byte> buffer_;
+  net::ToyCode code_;  ///< where toy streams are wanted
 };
 
 /// A listener on loopback.

@@ -169,7 +169,7 @@ struct TestConnection {
   }
 
   EgressRig& rig;
-  std::unique_ptr<MemoryStream> transport;
+  std::unique_ptr<net::Stream> transport;
   MemoryPeer peer;
   Outbox outbox;
   GatherWriter writer;
