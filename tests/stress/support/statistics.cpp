@@ -3,21 +3,20 @@
 #include <optional>
 #include <stdexcept>
 
-#include "proto/control/ctrl.hpp"
-
 namespace gimnet::stress {
 
 Statistics Statistics::of(RawNode& observer) {
-  Statistics statistics;
-  const auto answer =
-      observer.ask<proto::ctrl::StatisticsAnswer>(proto::Kind::ctrl, proto::ctrl::Statistics{});
+  return Statistics(
+      observer.ask<proto::ctrl::StatisticsAnswer>(proto::Kind::ctrl, proto::ctrl::Statistics{}));
+}
+
+Statistics::Statistics(const proto::ctrl::StatisticsAnswer& answer) {
   for (const auto& shard : answer.shards) {
     for (const auto& counter : shard.counters) {
-      statistics.counters_[counter.name] += counter.value;
-      statistics.by_shard_[shard.shard][counter.name] = counter.value;
+      counters_[counter.name] += counter.value;
+      by_shard_[shard.shard][counter.name] = counter.value;
     }
   }
-  return statistics;
 }
 
 std::uint64_t Statistics::dropped() const {

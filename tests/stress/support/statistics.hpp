@@ -5,6 +5,7 @@
 #include <map>
 #include <string>
 
+#include "proto/control/ctrl.hpp"
 #include "tests/stress/support/raw_node.hpp"
 
 namespace gimnet::stress {
@@ -14,6 +15,7 @@ class Statistics {
  public:
   /// REQUIRES: no data frames are on their way to `observer`.
   static Statistics of(RawNode& observer);
+  explicit Statistics(const proto::ctrl::StatisticsAnswer& answer);
 
   /// REQUIRES: the hub has a counter of that name.
   [[nodiscard]] std::uint64_t operator[](const std::string& name) const {
