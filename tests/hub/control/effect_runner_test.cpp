@@ -8,6 +8,7 @@
 #include "base/log.hpp"
 #include "proto/control/ctrl.hpp"
 #include "proto/control/ns.hpp"
+#include "proto/control/ns_register.hpp"
 #include "tests/hub/control/support/test_conductor.hpp"
 
 // The order of what the conductor publishes and tells is part of its meaning: who hears of an id
@@ -86,6 +87,34 @@ TEST_F(EffectRunnerTest, AnEventIsEncodedOnceForAllWhoHearOfIt) {
     told.insert(NodeId{proto::load_header(frame.data()).dst});
   }
   EXPECT_EQ(told, readers);
+}
+
+TEST_F(EffectRunnerTest, ANewNameIsEncodedOnceForEachServiceAndShard) {
+  constexpr std::size_t kServices = 40;
+  constexpr std::size_t kReaders = 100;
+  const Node robot = join("robot");
+  for (std::size_t k = 0; k < kServices; ++k) {
+    ASSERT_TRUE(ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "s" + std::to_string(k)}));
+  }
+  for (std::size_t i = 0; i < kReaders; ++i) {
+    const Node reader = join("reader-" + std::to_string(i));
+    for (std::size_t k = 0; k < kServices; ++k) {
+      ASSERT_TRUE(ask<ns::SubscribeAnswer>(reader, ns::Subscribe{"robot/s" + std::to_string(k)}));
+    }
+  }
+  std::size_t encoded = 0;
+  std::size_t told = 0;
+  std::size_t bytes = 0;
+  shards.on_tell = [&](const TellCommand& command) {
+    ++encoded;
+    told += command.to.size();
+    bytes += command.frame.capacity() + command.to.capacity() * sizeof(TellCommand::To);
+  };
+  ASSERT_TRUE(ask<ns::RegisterNameAnswer>(robot, ns::RegisterName{"lifter"}));
+  EXPECT_EQ(told, kServices * kReaders);
+  EXPECT_EQ(encoded, kServices * shards.shards());
+  EXPECT_LE(bytes, encoded * 256 + 2 * told * sizeof(TellCommand::To))
+      << "a vector that grows doubles";
 }
 
 }  // namespace

@@ -21,6 +21,7 @@ class FakeShards final : public ShardProxy {
   /// A TellCommand is written down as what it means: one SendControlCommand for each session.
   void send(ShardIndex shard, ShardCommand command) override {
     if (auto* tell = std::get_if<TellCommand>(&command)) {
+      if (on_tell) return on_tell(std::move(*tell));
       told.push_back(tell->to.size());
       for (const TellCommand::To& to : tell->to) {
         set_destination(tell->frame, to.node);
@@ -46,6 +47,7 @@ class FakeShards final : public ShardProxy {
   std::vector<Sent> sent;
   std::vector<std::size_t> told;  ///< sessions of each TellCommand
   std::function<void(const ShardCommand&)> on_send;
+  std::function<void(TellCommand)> on_tell;  ///< takes these instead
 
  private:
   const std::size_t count_;
