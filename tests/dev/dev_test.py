@@ -97,6 +97,7 @@ class Door(unittest.TestCase):
         self.assert_refuses("lint", "src", saying="lint takes no arguments")
         self.assert_refuses("planted", "A", saying="planted takes no arguments")
         self.assert_refuses("format", "src", saying="format takes no arguments")
+        self.assert_refuses("boost174", "src", saying="boost174 takes no arguments")
         self.assert_refuses("perf", "--fast", saying="unrecognized arguments: --fast")
         self.assert_refuses("perf", "--hel", saying="unrecognized arguments: --hel")
         self.assert_refuses("perf", "--only", "nonsense", saying="invalid choice: 'nonsense'")
