@@ -3,7 +3,9 @@
 
 Usage: cmake_test.py CMAKE"""
 
+import os
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -68,6 +70,63 @@ class Configuring(unittest.TestCase):
         pose = subprocess.run([self.folder / "build" / "pose"], stdin=subprocess.DEVNULL, capture_output=True, text=True,
                               timeout=TIMEOUT_S, check=False)
         self.assertEqual(pose.returncode, 0, pose.stderr)
+
+
+class WholeProject(unittest.TestCase):
+    """What a plain cmake makes of it, where ccache and mold are installed and nobody asked for them."""
+
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(folder.cleanup)
+        cls.folder = pathlib.Path(folder.name)
+        programs = cls.folder / "programs"
+        programs.mkdir()
+        for program, script in (("ccache", 'exec "$@"'), ("ld.mold", 'exec ld "$@"')):
+            (programs / program).write_text(f"#!/bin/sh\n{script}\n")
+            (programs / program).chmod(0o755)
+        cls.environment = {name: value for name, value in os.environ.items()
+                           if not name.startswith("GIMNET_") and name not in ("CFLAGS", "CXXFLAGS", "LDFLAGS")}
+        cls.environment["PATH"] = f"{programs}:{cls.environment['PATH']}"
+        cls.plain = cls.configure("plain")
+
+    @classmethod
+    def configure(cls, name, *arguments, **environment):
+        build = cls.folder / name
+        subprocess.run([CMAKE, "-S", ROOT, "-B", build, "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release", *arguments],
+                       stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, timeout=TIMEOUT_S,
+                       env=cls.environment | environment, check=True)
+        return build
+
+    @staticmethod
+    def options(build):
+        """Which of the three it builds with: warnings as errors, ccache, mold."""
+        ninja = "".join((build / name).read_text() for name in ("build.ninja", "CMakeFiles/rules.ninja"))
+        words = {"-Werror": r" -Werror", "ccache": r"\bccache ", "mold": r" -fuse-ld=mold"}
+        return {name: bool(re.search(word, ninja)) for name, word in words.items()}
+
+    def test_takes_no_warning_for_an_error_and_no_ccache_or_mold_unasked(self):
+        self.assertEqual(self.options(self.plain), {"-Werror": False, "ccache": False, "mold": False})
+
+    def test_takes_what_it_is_asked_for(self):
+        less = [f"-DGIMNET_{part}=OFF" for part in ("TESTS", "BENCH", "PERF", "EXAMPLES")]
+        asked = self.configure("asked", "-DGIMNET_WARNINGS_AS_ERRORS=ON", *less, GIMNET_CCACHE="1", GIMNET_MOLD="1")
+        self.assertEqual(self.options(asked), {"-Werror": True, "ccache": True, "mold": True})
+
+    def inputs(self, target):
+        """All that is made or read for the target."""
+        ninja = subprocess.run(["ninja", "-C", self.plain, "-t", "inputs", target], stdin=subprocess.DEVNULL, capture_output=True,
+                               text=True, timeout=TIMEOUT_S, check=True)
+        return [line.removeprefix(f"{ROOT}/") for line in ninja.stdout.splitlines()]
+
+    def test_the_product_is_programs_libraries_and_examples_alone(self):
+        inputs = self.inputs("product")
+        for part in ("src/hub/main.cpp", "src/tools/gimnet/main.cpp", "src/tools/demo/main.cpp", "src/client/libgimnet.mri",
+                     "examples/publisher.cpp"):
+            self.assertIn(part, inputs)
+        folders = {line.split("/")[0] for line in inputs if re.match(r"[^/].*\.(c|cpp|o)$", line)}
+        self.assertEqual(folders, {"src", "examples"}, "compiles nothing else")
+        self.assertIn("tests", {line.split("/")[0] for line in self.inputs("all_unit")})
 
 
 if __name__ == "__main__":
