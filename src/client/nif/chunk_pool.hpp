@@ -4,14 +4,12 @@
 #include <cstddef>
 #include <deque>
 #include <memory>
-#include <new>
 
 namespace gimnet::nif {
 
 /// A block of memory that frames are written into one after the other.
 struct Chunk {
-  explicit Chunk(std::size_t bytes)
-      : memory(new(std::nothrow) std::byte[bytes]), capacity(memory ? bytes : 0) {}
+  explicit Chunk(std::size_t bytes) : memory(new std::byte[bytes]), capacity(bytes) {}
   std::unique_ptr<std::byte[]> memory;
   std::size_t capacity;
   std::size_t used = 0;
@@ -23,19 +21,8 @@ class ChunkPool {
  public:
   static constexpr std::size_t kChunkBytes = 128 * 1024;
 
-  /// An empty chunk of at least `bytes`; null: no memory.
-  [[nodiscard]] std::shared_ptr<Chunk> take(std::size_t bytes) noexcept {
-    try {
-      return find_or_make(bytes);
-    } catch (const std::bad_alloc&) {
-      return nullptr;
-    }
-  }
-
- private:
-  static constexpr std::size_t kKept = 16;
-
-  [[nodiscard]] std::shared_ptr<Chunk> find_or_make(std::size_t bytes) {
+  /// An empty chunk of at least `bytes`. May throw std::bad_alloc.
+  [[nodiscard]] std::shared_ptr<Chunk> take(std::size_t bytes) {
     if (bytes <= kChunkBytes && !chunks_.empty() && chunks_.front().use_count() == 1) {
       std::shared_ptr<Chunk> chunk = std::move(chunks_.front());
       chunks_.pop_front();
@@ -44,10 +31,12 @@ class ChunkPool {
       return chunk;
     }
     auto chunk = std::make_shared<Chunk>(std::max(bytes, kChunkBytes));
-    if (chunk->capacity == 0) return nullptr;
     if (bytes <= kChunkBytes && chunks_.size() < kKept) chunks_.push_back(chunk);
     return chunk;
   }
+
+ private:
+  static constexpr std::size_t kKept = 16;
 
   std::deque<std::shared_ptr<Chunk>>
       chunks_;  ///< the one handed out longest ago is first. Limit: kKept

@@ -58,7 +58,12 @@ void Node::run() {
       disconnect("the library ran out of memory", proto::GoodbyeCode::no_memory);
     }
   }
-  leave();
+  try {
+    leave();
+  } catch (const std::bad_alloc&) {
+    outbound_.detach(false);  // without its last words
+    stream_.reset();
+  }
 }
 
 Deadline Node::next_timer(bool reading, std::int64_t last_write_ns) const {

@@ -35,16 +35,26 @@ void Outbound::wake_library() {
 
 /// One gathered write. False: nothing waits, or the kernel takes no more.
 bool Outbound::write_once() {
+  if (no_memory_) return false;
   try {
     return write_gathered();
   } catch (const std::bad_alloc&) {
-    broken_ = no_memory_ = true;  // whose message it was has its answer: the connection ends
+    on_no_memory();  // the sender of the message has its answer already
     return false;
   }
 }
 
+void Outbound::on_no_memory() {
+  broken_ = no_memory_ = true;
+  wake_library();
+}
+
 bool Outbound::write_gathered() {
   if (!held_.empty()) put_held();
+  if (leaving_ && queue_.all_written() && !goodbye_.empty()) {
+    put_frame(queue_.append_control(goodbye_.size()), goodbye_);
+    goodbye_.clear();
+  }
   const auto pieces = queue_.gather();
   net::Stream& stream = *stream_;
   if (pieces.empty() && stream.pending_out() == 0) return false;
@@ -57,7 +67,7 @@ bool Outbound::write_gathered() {
   bytes_sent_ += result.bytes;
   queue_.commit(result.bytes);
   if (result.bytes > 0) notify_waiting();
-  broken_ = result.status == net::IoStatus::failed;
+  broken_ = broken_ || result.status == net::IoStatus::failed;
   // A callback's time is not waited for: see write_or_leave().
   full_ = !broken_ && (result.bytes < offered || stream.pending_out() != 0);
   return !broken_ && !full_;
@@ -115,25 +125,23 @@ Outbound::Wants Outbound::wants() {
 }
 
 /// Copies a frame into the queue under the id that the node has now.
-bool Outbound::put_frame(std::span<std::byte> memory, std::span<const std::byte> frame) {
-  if (memory.empty()) return false;
+void Outbound::put_frame(std::span<std::byte> memory, std::span<const std::byte> frame) {
   proto::FrameHeader header = proto::load_header(frame.data());
   header.src = id_;
   std::memcpy(memory.data(), frame.data(), frame.size());
   proto::store_header(memory.data(), header);
-  return true;
 }
 
-bool Outbound::put_flow(const proto::flow::Message& message) {
+void Outbound::put_flow(const proto::flow::Message& message) {
   std::array<std::byte, proto::flow::kFrameSizeMax> frame;
   const std::size_t size = proto::flow::encode_frame(message, NodeId{0}, frame);
-  return put_frame(queue_.append_control(size), std::span<const std::byte>(frame).first(size));
+  put_frame(queue_.append_control(size), std::span<const std::byte>(frame).first(size));
 }
 
 bool Outbound::post(std::span<const std::byte> frame) {
-  const MutexLock lock(mutex_);
-  if (state_ != State::connected || !put_frame(queue_.append_control(frame.size()), frame))
-    return false;
+  const Inside inside(*this);
+  if (!usable()) return false;
+  put_frame(queue_.append_control(frame.size()), frame);
   count_appended(kBurstBytes);  // before all messages: what gathers does not wait for more
   write_or_leave(false);
   return true;
@@ -146,11 +154,11 @@ bool Outbound::post(const proto::flow::Message& message) {
 }
 
 bool Outbound::post_data(std::span<const std::byte> frame) {
-  const MutexLock lock(mutex_);
+  const Inside inside(*this);
   const proto::FrameHeader header = proto::load_header(frame.data());
   if (pauses_.is_paused(stream_code(header.kind, header.lane, header.dst))) return false;
-  if (state_ != State::connected || !put_frame(queue_.append(header.lane, frame.size()), frame))
-    return false;
+  if (!usable()) return false;
+  put_frame(queue_.append(header.lane, frame.size()), frame);
   count_appended(kBurstBytes);
   write_or_leave(false);
   return true;
@@ -166,7 +174,7 @@ void Outbound::forget_retained(const std::string& service) {
   last_.forget(service);
 }
 
-bool Outbound::put_piece(const LastMessage& last, const proto::FrameParts& parts,
+void Outbound::put_piece(const LastMessage& last, const proto::FrameParts& parts,
                          std::uint32_t offset) {
   const proto::FrameHeader& header = parts.header;
   const std::size_t bytes = proto::prefix_size(parts) + parts.payload_size;
@@ -175,17 +183,15 @@ bool Outbound::put_piece(const LastMessage& last, const proto::FrameParts& parts
   const auto memory =
       replaceable ? queue_.append_latest(header.lane, bytes, latest_stream_of(header, parts.key))
                   : queue_.append(header.lane, bytes);
-  if (memory.empty()) return false;
   const std::size_t prefix = proto::write_prefix(parts, memory);
   std::copy_n(last.payload.data() + offset, parts.payload_size, memory.data() + prefix);
   count_appended(bytes);
-  return true;
 }
 
 void Outbound::send_last_again(const std::string& service) {
-  const MutexLock lock(mutex_);
+  const Inside inside(*this);
   const LastMessage* const last = last_.find(service);
-  if (last == nullptr || state_ != State::connected) return;
+  if (last == nullptr || !usable()) return;
   proto::FrameParts parts = last->parts();
   const proto::FrameHeader& header = parts.header;
   const auto newer = in_progress_.find(stream_code(header.kind, header.lane, header.dst));
@@ -209,7 +215,7 @@ void Outbound::send_last_again(const std::string& service) {
   do {
     parts.payload_size = std::min(piece_max, total - offset);
     if (parts.fragment) parts.fragment->offset = offset;
-    if (!put_piece(*last, parts, offset)) break;
+    put_piece(*last, parts, offset);
     offset += static_cast<std::uint32_t>(parts.payload_size);
   } while (offset < total);
   write_or_leave(false);
@@ -221,7 +227,7 @@ void Outbound::begin_declaring() {
 }
 
 std::uint64_t Outbound::readdress(const SendQueue::GroupMap& moves) {
-  const MutexLock lock(mutex_);
+  const Inside inside(*this);
   for (auto& [former, now] : moves_) {
     if (const auto moved = moves.find(now); now != 0 && moved != moves.end()) now = moved->second;
   }
@@ -231,13 +237,7 @@ std::uint64_t Outbound::readdress(const SendQueue::GroupMap& moves) {
   for (const auto& [former, now] : moves) {
     if (now != 0) moves_.erase(now);
   }
-  std::uint64_t lost = 0;
-  try {
-    if (queue_.held_back()) lost = queue_.go_on(moves);
-  } catch (const std::bad_alloc&) {
-    no_memory_ = true;
-    throw;
-  }
+  const std::uint64_t lost = queue_.held_back() ? queue_.go_on(moves) : 0;
   lost_ |= lost > 0;
   return lost;
 }

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <exception>
 #include <optional>
 #include <span>
 #include <string>
@@ -34,6 +35,9 @@ namespace gimnet::nif {
 /// another that writing is left to the library's thread, which gathers them. One small message on
 /// an idle connection is one system call in the caller's thread.
 ///
+/// Where memory runs out inside, the call throws std::bad_alloc, and the connection ends: the
+/// library's thread begins anew with an empty queue.
+///
 /// Thread safety: send, flush, drain, post and the counters from any thread; the rest from the
 /// library's thread.
 class Outbound {
@@ -48,11 +52,11 @@ class Outbound {
   [[nodiscard]] nif_status flush() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] nif_status drain(Deadline deadline) GIMNET_EXCLUDES(mutex_);
   /// A frame of the connection itself (FLOW, LINK, NS, CTRL), before all messages. The source is
-  /// filled in here, where it cannot change on the way. False: not connected, or no memory.
+  /// filled in here, where it cannot change on the way. False: not connected.
   bool post(std::span<const std::byte> frame) GIMNET_EXCLUDES(mutex_);
   bool post(const proto::flow::Message& message) GIMNET_EXCLUDES(mutex_);
   /// A frame of a data kind that the library sends by itself; it does not wait for room. False: the
-  /// hub paused its way, not connected, or no memory.
+  /// hub paused its way, not connected.
   bool post_data(std::span<const std::byte> frame) GIMNET_EXCLUDES(mutex_);
   /// The own service of that name is retained and has this group now (0: none): its last message is
   /// kept, see LastMessages.
@@ -65,9 +69,8 @@ class Outbound {
   [[nodiscard]] std::uint32_t waiting() GIMNET_EXCLUDES(mutex_);
 
   // The library's thread.
-  /// The connection stands. Returns what SKIP has to announce; nothing: the hub's count is
-  /// impossible, and it is not attached. May throw std::bad_alloc, as may readdress(): then
-  /// detach() must follow.
+  /// The connection stands. Returns the count that SKIP has to announce; nothing: the hub's count
+  /// is impossible, and it is not attached.
   [[nodiscard]] std::optional<std::uint64_t> attach(net::Stream& stream, const Session& session)
       GIMNET_EXCLUDES(mutex_);
   /// The connection broke; `again`: another one will come. When this returns nobody uses the stream
@@ -136,6 +139,29 @@ class Outbound {
   static constexpr std::size_t kBurstBytes = 64 * 1024;
 
   enum class State : std::uint8_t { away, connected, ended };
+  /// Holds the lock. Memory that runs out meanwhile leaves a queue that is not in order.
+  class GIMNET_SCOPED_CAPABILITY Inside {
+   public:
+    explicit Inside(Outbound& outbound) GIMNET_ACQUIRE(outbound.mutex_)
+        : outbound_(outbound), exceptions_(std::uncaught_exceptions()) {
+      outbound.mutex_.lock();
+    }
+    ~Inside() GIMNET_RELEASE() GIMNET_NO_THREAD_SAFETY_ANALYSIS {
+      if (std::uncaught_exceptions() != exceptions_) outbound_.on_no_memory();
+      outbound_.mutex_.unlock();
+    }
+    Inside(const Inside&) = delete;
+    Inside& operator=(const Inside&) = delete;
+
+   private:
+    Outbound& outbound_;
+    const int exceptions_;
+  };
+  /// The one place where a connection ends for want of memory.
+  void on_no_memory() GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] bool usable() const GIMNET_REQUIRES(mutex_) {
+    return state_ == State::connected && !no_memory_;
+  }
   [[nodiscard]] nif_status send_whole(Outgoing& message, Deadline deadline) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status send_fragments(Outgoing& message, Deadline deadline)
       GIMNET_REQUIRES(mutex_);
@@ -147,8 +173,8 @@ class Outbound {
   void put_held() GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool put_held(HeldMessage& held) GIMNET_REQUIRES(mutex_);
   void drop_held() GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] nif_status put_piece(Outgoing& message, SendProgress& progress,
-                                     proto::Fragmenter& fragmenter) GIMNET_REQUIRES(mutex_);
+  void put_piece(Outgoing& message, SendProgress& progress, proto::Fragmenter& fragmenter)
+      GIMNET_REQUIRES(mutex_);
   [[nodiscard]] std::uint32_t piece_max(const Outgoing& message) const GIMNET_REQUIRES(mutex_);
   void redirect(Outgoing& message) const GIMNET_REQUIRES(mutex_);
   /// The hub refuses the service whose group that is or was.
@@ -160,12 +186,12 @@ class Outbound {
                                                 const SendProgress* own, Deadline deadline)
       GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status check_progress(const SendProgress& own) const GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] bool put_frame(std::span<std::byte> memory, std::span<const std::byte> frame)
+  void put_frame(std::span<std::byte> memory, std::span<const std::byte> frame)
       GIMNET_REQUIRES(mutex_);
-  /// Queues a FLOW frame; false: no memory.
-  [[nodiscard]] bool put_flow(const proto::flow::Message& message) GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] bool put_piece(const LastMessage& last, const proto::FrameParts& parts,
-                               std::uint32_t offset) GIMNET_REQUIRES(mutex_);
+  /// Queues a FLOW frame.
+  void put_flow(const proto::flow::Message& message) GIMNET_REQUIRES(mutex_);
+  void put_piece(const LastMessage& last, const proto::FrameParts& parts, std::uint32_t offset)
+      GIMNET_REQUIRES(mutex_);
   [[nodiscard]] std::uint32_t number_of(Outgoing& message, bool windowed) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool is_retained(const Outgoing& message) const GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status check_retained(Outgoing& message) const GIMNET_REQUIRES(mutex_);
@@ -180,9 +206,8 @@ class Outbound {
   [[nodiscard]] bool has_room(const Outgoing& message, std::size_t frame_size,
                               const SendProgress* own) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool wait(Deadline deadline) GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] nif_status put(Outgoing& message, std::optional<proto::FragmentHeader> fragment,
-                               std::uint32_t offset, std::uint32_t size, bool report)
-      GIMNET_REQUIRES(mutex_);
+  void put(Outgoing& message, std::optional<proto::FragmentHeader> fragment, std::uint32_t offset,
+           std::uint32_t size, bool report) GIMNET_REQUIRES(mutex_);
   void write_or_leave(bool more) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool in_burst() GIMNET_REQUIRES(mutex_);
   void count_appended(std::size_t bytes) GIMNET_REQUIRES(mutex_);

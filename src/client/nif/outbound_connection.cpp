@@ -27,11 +27,11 @@ bool Outbound::put_held(HeldMessage& held) {
   while (!held.fragmenter.done()) {
     if (held.progress.lost(epochs_)) return true;
     if (!has_room(message, frame, &held.progress)) return false;
-    const bool refused = message.is_group() && refuses(message.parts().header.dst);
-    if (refused || put_piece(message, held.progress, held.fragmenter) != NIF_OK) {
+    if (message.is_group() && refuses(message.parts().header.dst)) {
       lost_ = true;
       return true;
     }
+    put_piece(message, held.progress, held.fragmenter);
   }
   return true;
 }
@@ -44,7 +44,7 @@ void Outbound::drop_held() {
 }
 
 void Outbound::look_after_held() {
-  const MutexLock lock(mutex_);
+  const Inside inside(*this);
   if (state_ != State::connected || held_.empty()) return;
   for (const HeldMessage& held : held_) {
     if (held.progress.windowed && held.progress.window.room() == 0) probe(held.progress);
@@ -71,14 +71,8 @@ std::optional<std::uint64_t> Outbound::take_up(const Session& session) {
 }
 
 std::optional<std::uint64_t> Outbound::attach(net::Stream& stream, const Session& session) {
-  const MutexLock lock(mutex_);
-  std::optional<std::uint64_t> missing;
-  try {
-    missing = take_up(session);
-  } catch (const std::bad_alloc&) {
-    no_memory_ = true;
-    throw;
-  }
+  const Inside inside(*this);
+  const std::optional<std::uint64_t> missing = take_up(session);
   if (!missing) return std::nullopt;
   id_ = session.id;
   frame_bytes_max_ = session.frame_bytes_max;
@@ -89,8 +83,7 @@ std::optional<std::uint64_t> Outbound::attach(net::Stream& stream, const Session
   full_ = false;
   broken_ = false;
   last_write_ns_ = steady_now_ns();
-  if (*missing > 0 && !put_flow(proto::flow::Skip{proto::DropReason::link_lost, *missing}))
-    return std::nullopt;
+  if (*missing > 0) put_flow(proto::flow::Skip{proto::DropReason::link_lost, *missing});
   // A handle that is being closed stays closed: whoever waits in it leaves, and nobody else comes
   // in.
   if (state_ != State::ended) state_ = State::connected;
@@ -131,8 +124,8 @@ void Outbound::end(const Failure& failure) {
 }
 
 void Outbound::begin_leaving(std::uint64_t taken, std::span<const std::byte> goodbye) {
-  const MutexLock lock(mutex_);
-  if (taken != 0) static_cast<void>(put_flow(proto::flow::Confirm{taken}));
+  const Inside inside(*this);
+  if (taken != 0) put_flow(proto::flow::Confirm{taken});
   goodbye_.assign(goodbye.begin(), goodbye.end());
   leaving_ = true;
   // Nobody hears where the services are now.
@@ -144,13 +137,8 @@ bool Outbound::write_last() {
   while (writing_) static_cast<void>(wait(kNever));
   if (stream_ == nullptr || broken_) return false;
   writing_ = true;
-  do {
-    if (!held_.empty()) put_held();
-    if (queue_.all_written() && !goodbye_.empty()) {
-      static_cast<void>(put_frame(queue_.append_control(goodbye_.size()), goodbye_));
-      goodbye_.clear();
-    }
-  } while (write_once());
+  while (write_once()) {
+  }
   end_writing();
   return !broken_ && !all_sent();
 }

@@ -77,7 +77,7 @@ bool Outbound::gather_burst() {
 }
 
 void Outbound::write_or_leave(bool more) {
-  if (state_ != State::connected || writing_ || broken_) return;
+  if (!usable() || writing_ || broken_) return;
   if (more && queue_.unsent_bytes() < kHeldBytesMax) return;
   if (!in_callbacks_) {
     if (full_) return;  // the library's thread waits for the kernel
@@ -118,7 +118,7 @@ nif_status Outbound::no_turn() const {
 }
 
 bool Outbound::may_go(const Outgoing& message, std::size_t frame_size, const SendProgress* own) {
-  return state_ == State::connected && has_room(message, frame_size, own);
+  return usable() && has_room(message, frame_size, own);
 }
 
 bool Outbound::has_room(const Outgoing& message, std::size_t frame_size, const SendProgress* own) {
@@ -168,7 +168,6 @@ void Outbound::probe(const SendProgress& own) {
   header.flags = proto::kFlagReport;
   header.lane = static_cast<std::uint8_t>(proto::Lane::real_time);
   const auto memory = queue_.append(header.lane, header.frame_size());
-  if (memory.empty()) return;
   proto::store_header(memory.data(), header);
   proto::encode_taken({}, memory.subspan<proto::kHeaderSize, proto::kTakenSize>());
   write_or_leave(false);
@@ -215,20 +214,18 @@ nif_status Outbound::wait_until_it_may_go(const Outgoing& message, std::size_t f
   }
 }
 
-nif_status Outbound::put(Outgoing& message, std::optional<proto::FragmentHeader> fragment,
-                         std::uint32_t offset, std::uint32_t size, bool report) {
+void Outbound::put(Outgoing& message, std::optional<proto::FragmentHeader> fragment,
+                   std::uint32_t offset, std::uint32_t size, bool report) {
   const std::size_t bytes = frame_size(message, fragment.has_value(), size);
   const proto::FrameHeader& header = message.parts().header;
   const auto memory =
       message.replaceable()
           ? queue_.append_latest(header.lane, bytes, latest_stream_of(header, message.parts().key))
           : queue_.append(header.lane, bytes);
-  if (memory.empty()) return fail(NIF_NO_MEMORY, "no memory for the message");
   message.write_frame(memory, id_, fragment, offset, size, report);
   // What is urgent ends the gathering.
   count_appended(header.lane == static_cast<std::uint8_t>(proto::Lane::real_time) ? kBurstBytes
                                                                                   : bytes);
-  return NIF_OK;
 }
 
 /// For a message that has a fragment header.
@@ -245,7 +242,8 @@ nif_status Outbound::send_whole(Outgoing& message, Deadline deadline) {
   if (turn != NIF_OK) return turn;
   std::optional<proto::FragmentHeader> fragment;
   if (with_header) fragment = proto::FragmentHeader{number_of(message, false), 0, message.size()};
-  return put(message, fragment, 0, message.size(), false);
+  put(message, fragment, 0, message.size(), false);
+  return NIF_OK;
 }
 
 std::uint32_t Outbound::piece_max(const Outgoing& message) const {
@@ -255,14 +253,12 @@ std::uint32_t Outbound::piece_max(const Outgoing& message) const {
 }
 
 /// The next fragment. REQUIRES: it may go.
-nif_status Outbound::put_piece(Outgoing& message, SendProgress& progress,
-                               proto::Fragmenter& fragmenter) {
+void Outbound::put_piece(Outgoing& message, SendProgress& progress, proto::Fragmenter& fragmenter) {
   const proto::Piece piece = fragmenter.next(
       progress.windowed ? std::min(progress.window.room(), piece_max(message)) : UINT32_MAX);
   const proto::FragmentHeader fragment{progress.number, piece.offset, message.size()};
-  const nif_status status = put(message, fragment, piece.offset, piece.size, progress.windowed);
-  if (status == NIF_OK && progress.windowed) progress.window.on_sent(piece.size);
-  return status;
+  put(message, fragment, piece.offset, piece.size, progress.windowed);
+  if (progress.windowed) progress.window.on_sent(piece.size);
 }
 
 nif_status Outbound::send_pieces(Outgoing& message, SendProgress& progress, Deadline deadline) {
@@ -279,8 +275,7 @@ nif_status Outbound::send_pieces(Outgoing& message, SendProgress& progress, Dead
       progress.epoch = epochs_;
       progress.window = proto::SendWindow(progress.number, message.size());
     }
-    const nif_status status = put_piece(message, progress, fragmenter);
-    if (status != NIF_OK) return status;
+    put_piece(message, progress, fragmenter);
     write_or_leave(!fragmenter.done() || message.more());
   }
   return NIF_OK;
@@ -308,6 +303,7 @@ nif_status Outbound::send_fragments(Outgoing& message, Deadline deadline) {
   try {
     status = send_pieces(message, progress, deadline);
   } catch (const std::bad_alloc&) {
+    on_no_memory();
     status =
         fail(NIF_NO_MEMORY, "no memory for the message; if it had begun, its receiver lost it");
   }
@@ -318,7 +314,7 @@ nif_status Outbound::send_fragments(Outgoing& message, Deadline deadline) {
 }
 
 nif_status Outbound::send(Outgoing& message, Deadline deadline) {
-  const MutexLock lock(mutex_);
+  const Inside inside(*this);
   const bool whole = message.size() <= proto::kUncutMessageMax;
   reports_wanted_ |= message.reported();
   message.set_patient(deadline == kNever);
@@ -360,13 +356,14 @@ nif_status Outbound::flush() {
 bool Outbound::ask_for_confirm() {
   if (state_ != State::connected || asked_ || writing_ || broken_ || !queue_.all_written())
     return false;
-  asked_ = put_flow(proto::flow::Ping{kAskSequence, wall_now_ns()});
-  if (asked_) write_or_leave(false);
-  return asked_;
+  put_flow(proto::flow::Ping{kAskSequence, wall_now_ns()});
+  asked_ = true;
+  write_or_leave(false);
+  return true;
 }
 
 nif_status Outbound::drain(Deadline deadline) {
-  const MutexLock lock(mutex_);
+  const Inside inside(*this);
   for (;;) {
     if (state_ == State::ended) return not_connected();
     if (state_ == State::away && !queue_.resume()) return not_connected();

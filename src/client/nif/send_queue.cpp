@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <iterator>
-#include <new>
 #include <utility>
 
 #include "base/check.hpp"
@@ -14,16 +13,6 @@ namespace {
 constexpr std::size_t kTurnBytes = 16 * 1024;
 /// A lane that waited while this much went is next: 1/16 of the bytes.
 constexpr std::size_t kPassedOverMax = 15 * kTurnBytes;
-
-/// False: no memory, and nothing changed.
-bool push(SendQueue::Runs& runs, FrameRun run) noexcept {
-  try {
-    runs.push_back(std::move(run));
-    return true;
-  } catch (const std::bad_alloc&) {
-    return false;
-  }
-}
 
 }  // namespace
 
@@ -44,21 +33,18 @@ bool SendQueue::has_room(std::size_t frame_size) {
          (retained_.bytes() == 0 && unsent_bytes_ == 0);
 }
 
-SendQueue::Place SendQueue::allocate(std::size_t size) noexcept {
+SendQueue::Place SendQueue::allocate(std::size_t size) {
   if (!open_chunk_ || open_chunk_->capacity - open_chunk_->used < size) {
-    auto fresh = pool_.take(size);
-    if (!fresh) return {};
-    open_chunk_ = std::move(fresh);
+    open_chunk_ = pool_.take(size);
   }
   const std::size_t begin = open_chunk_->used;
   open_chunk_->used += size;
   return {open_chunk_, begin};
 }
 
-std::span<std::byte> SendQueue::append(std::uint8_t lane, std::size_t size) noexcept {
+std::span<std::byte> SendQueue::append(std::uint8_t lane, std::size_t size) {
   GIMNET_CHECK(lane < lanes_.size() && size >= proto::kHeaderSize);
   Place place = allocate(size);
-  if (!place.chunk) return {};
   Runs& runs = lanes_[lane];
   std::byte* memory = place.chunk->memory.get() + place.begin;
   const bool extends = !runs.empty() && runs.back().chunk == place.chunk &&
@@ -66,19 +52,18 @@ std::span<std::byte> SendQueue::append(std::uint8_t lane, std::size_t size) noex
   if (extends) {
     runs.back().end += size;
     ++runs.back().frames;
-  } else if (!push(runs, {std::move(place.chunk), place.begin, place.begin + size, 1, lane,
-                          FrameRun::Sort::data})) {
-    return {};
+  } else {
+    runs.push_back(
+        {std::move(place.chunk), place.begin, place.begin + size, 1, lane, FrameRun::Sort::data});
   }
   unsent_bytes_ += size;
   return {memory, size};
 }
 
 std::span<std::byte> SendQueue::append_latest(std::uint8_t lane, std::size_t size,
-                                              const LatestStream& stream) noexcept {
+                                              const LatestStream& stream) {
   GIMNET_CHECK(lane < lanes_.size() && size >= proto::kHeaderSize);
   Place place = allocate(size);
-  if (!place.chunk) return {};
   const std::span<std::byte> memory{place.chunk->memory.get() + place.begin, size};
   if (const auto older = latest_.find(stream); older != latest_.end()) {
     FrameRun& run = *older->second;
@@ -90,26 +75,18 @@ std::span<std::byte> SendQueue::append_latest(std::uint8_t lane, std::size_t siz
     return memory;
   }
   Runs& runs = lanes_[lane];
-  if (!push(runs, {std::move(place.chunk), place.begin, place.begin + size, 1, lane,
-                   FrameRun::Sort::latest}))
-    return {};
-  try {
-    latest_.emplace(stream, &runs.back());
-  } catch (const std::bad_alloc&) {
-    runs.pop_back();
-    return {};
-  }
+  runs.push_back(
+      {std::move(place.chunk), place.begin, place.begin + size, 1, lane, FrameRun::Sort::latest});
+  latest_.emplace(stream, &runs.back());
   unsent_bytes_ += size;
   return memory;
 }
 
-std::span<std::byte> SendQueue::append_control(std::size_t size) noexcept {
+std::span<std::byte> SendQueue::append_control(std::size_t size) {
   Place place = allocate(size);
-  if (!place.chunk) return {};
   std::byte* memory = place.chunk->memory.get() + place.begin;
-  FrameRun run{std::move(place.chunk), place.begin, place.begin + size, 1, 0,
-               FrameRun::Sort::control};
-  if (!push(control_, std::move(run))) return {};
+  control_.push_back(
+      {std::move(place.chunk), place.begin, place.begin + size, 1, 0, FrameRun::Sort::control});
   unsent_bytes_ += size;
   return {memory, size};
 }

@@ -29,8 +29,8 @@ struct LatestStream {
 /// Frames on their way out: four lanes of frames that wait, the frames of one write under way, and,
 /// where resume is on, the frames that were written and not confirmed. A write is gather(), the
 /// system call on what it gave out, commit(). Between the two frames may be appended and confirmed;
-/// nothing else may be called. Errors: appending answers with no memory, and nothing changed. What
-/// else throws std::bad_alloc leaves a queue of which only drop_all() may be called. Thread safety:
+/// nothing else may be called. Errors: std::bad_alloc of any call but drop_all(), which is the only
+/// one that may follow. Thread safety:
 /// guarded by its owner. Limits: the owner asks has_room() before it appends, but for what it
 /// brings again after a reconnect.
 class SendQueue {
@@ -58,14 +58,13 @@ class SendQueue {
   }
 
   /// Memory for one data frame at the end of the lane; the caller writes the whole frame before it
-  /// lets go of its lock. Empty: no memory. REQUIRES: 16 <= size, lane < 4.
-  [[nodiscard]] std::span<std::byte> append(std::uint8_t lane, std::size_t size) noexcept;
+  /// lets go of its lock. REQUIRES: 16 <= size, lane < 4.
+  [[nodiscard]] std::span<std::byte> append(std::uint8_t lane, std::size_t size);
   /// The same for LATEST: in the place of the older frame of the stream, or at the end of the lane.
   [[nodiscard]] std::span<std::byte> append_latest(std::uint8_t lane, std::size_t size,
-                                                   const LatestStream& stream) noexcept;
-  /// Memory for a frame that goes before all lanes and is neither counted nor kept. Empty: no
-  /// memory.
-  [[nodiscard]] std::span<std::byte> append_control(std::size_t size) noexcept;
+                                                   const LatestStream& stream);
+  /// Memory for a frame that goes before all lanes and is neither counted nor kept.
+  [[nodiscard]] std::span<std::byte> append_control(std::size_t size);
 
   /// Chooses what to write next, at most kGatherBytesMax, lower lanes first, but at least 1/16 for
   /// each lane that waits. Returns the pieces in order; empty: nothing waits. Valid until:
@@ -117,7 +116,7 @@ class SendQueue {
     std::shared_ptr<Chunk> chunk;
     std::size_t begin = 0;
   };
-  [[nodiscard]] Place allocate(std::size_t size) noexcept;
+  [[nodiscard]] Place allocate(std::size_t size);
   [[nodiscard]] std::optional<std::uint8_t> pick_lane() const;
   void stage(Runs& from, std::size_t bytes_max);
   void stage_lanes();
