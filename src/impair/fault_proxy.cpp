@@ -5,7 +5,6 @@
 #include <poll.h>
 #include <sys/eventfd.h>
 #include <sys/socket.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -20,34 +19,50 @@
 #include "base/clock.hpp"
 #include "base/descriptor.hpp"
 #include "base/mutex.hpp"
-#include "impair/address.hpp"
 #include "impair/delayed_channel.hpp"
+#include "net/host_lookup.hpp"
 
 namespace gimnet::impair {
 namespace {
 
 constexpr std::int64_t kNever = DelayedChannel::kNever;
 constexpr int kBacklog = 128;
-constexpr std::string_view kUnix = "unix:";
 
-int open_socket(const Address& address) {
-  const int made = ::socket(address.bytes.ss_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+const sockaddr* get(const net::HostAddress& address) {
+  return reinterpret_cast<const sockaddr*>(address.data());
+}
+
+socklen_t size_of(const net::HostAddress& address) {
+  return static_cast<socklen_t>(address.size());
+}
+
+/// The first address; waits for the look-up of its host.
+Result<net::HostAddress> find(const net::Address& address) {
+  const net::WakeSignal never;
+  auto found = net::find_addresses(address, net::kNever, never);
+  if (!found) return Error{std::move(found.error().sentence)};
+  return std::move(found->front());
+}
+
+int open_socket(const net::HostAddress& address) {
+  const int made = ::socket(get(address)->sa_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   const int on = 1;
   // Pieces leave as they are due. Fails on Unix sockets, which do not join them.
   static_cast<void>(::setsockopt(made, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on));
   return made;
 }
 
-/// The URL of a listening socket: the one that was asked for, with the port that the system chose.
-std::string bound_url(std::string_view url, int descriptor) {
-  if (!url.starts_with("tcp://")) return std::string(url);
+/// The address of a listening socket: the one that was asked for, with the port that the system
+/// chose.
+net::Address bound(net::Address address, int descriptor) {
   sockaddr_storage bytes{};
   socklen_t size = sizeof bytes;
   static_cast<void>(::getsockname(descriptor, reinterpret_cast<sockaddr*>(&bytes), &size));
-  const std::uint16_t port = bytes.ss_family == AF_INET6
-                                 ? reinterpret_cast<const sockaddr_in6&>(bytes).sin6_port
-                                 : reinterpret_cast<const sockaddr_in&>(bytes).sin_port;
-  return std::string(url.substr(0, url.rfind(':') + 1)) + std::to_string(ntohs(port));
+  if (bytes.ss_family == AF_INET6)
+    address.port = ntohs(reinterpret_cast<const sockaddr_in6&>(bytes).sin6_port);
+  if (bytes.ss_family == AF_INET)
+    address.port = ntohs(reinterpret_cast<const sockaddr_in&>(bytes).sin_port);
+  return address;
 }
 
 bool would_block(int error) { return error == EAGAIN || error == EWOULDBLOCK || error == EINTR; }
@@ -95,11 +110,12 @@ void end_by_reset(Connection& connection) {
 /// is behind the mutex, and the event wakes the thread.
 class FaultProxy::Relay {
  public:
-  Relay(int listener, std::string url, const Address& target, const Impairment& how,
+  Relay(int listener, const net::Address& address, net::HostAddress target, const Impairment& how,
         std::uint64_t seed)
       : listener_(listener),
-        url_(std::move(url)),
-        target_(target),
+        url_(address.url()),
+        path_(address.path),
+        target_(std::move(target)),
         event_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
         orders_{.how = how},
         random_(seed) {
@@ -109,7 +125,7 @@ class FaultProxy::Relay {
   ~Relay() {
     order([](Orders& orders) { orders.ends = true; });
     thread_.join();
-    if (url_.starts_with(kUnix)) ::unlink(url_.c_str() + kUnix.size());
+    if (!path_.empty()) ::unlink(path_.c_str());
   }
 
   struct Orders {
@@ -154,7 +170,8 @@ class FaultProxy::Relay {
 
   const Descriptor listener_;
   const std::string url_;
-  const Address target_;
+  const std::string path_;  ///< of a Unix socket
+  const net::HostAddress target_;
   const Descriptor event_;
   mutable Mutex mutex_;
   Orders orders_ GIMNET_GUARDED_BY(mutex_);
@@ -236,7 +253,7 @@ void FaultProxy::Relay::accept_all() {
     ++done_.accepted;
     Connection& connection = connections_.emplace_back(accepted, open_socket(target_), random_());
     if (now_.refuses ||
-        (::connect(connection.target.socket.get(), target_.get(), target_.size) != 0 &&
+        (::connect(connection.target.socket.get(), get(target_), size_of(target_)) != 0 &&
          errno != EINPROGRESS)) {
       ++done_.refused;
       end_by_reset(connection);
@@ -338,21 +355,22 @@ void FaultProxy::Relay::wait() {
   }
 }
 
-Result<std::unique_ptr<FaultProxy>> FaultProxy::open(std::string_view listen,
-                                                     std::string_view target, const Impairment& how,
-                                                     std::uint64_t seed) {
-  const auto at = find_address(listen);
+Result<std::unique_ptr<FaultProxy>> FaultProxy::open(const net::Address& listen,
+                                                     const net::Address& target,
+                                                     const Impairment& how, std::uint64_t seed) {
+  const auto at = find(listen);
   if (!at) return at.error();
-  const auto to = find_address(target);
+  auto to = find(target);
   if (!to) return to.error();
   Descriptor listener(open_socket(*at));
   const int on = 1;
   static_cast<void>(::setsockopt(listener.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on));
-  if (::bind(listener.get(), at->get(), at->size) != 0 || ::listen(listener.get(), kBacklog) != 0) {
-    return Error{"cannot listen on '" + std::string(listen) + "': " + system_text(errno)};
+  if (::bind(listener.get(), get(*at), size_of(*at)) != 0 ||
+      ::listen(listener.get(), kBacklog) != 0) {
+    return Error{"cannot listen on " + listen.url() + ": " + system_text(errno)};
   }
-  std::string url = bound_url(listen, listener.get());
-  auto relay = std::make_unique<Relay>(listener.release(), std::move(url), *to, how, seed);
+  const net::Address address = bound(listen, listener.get());
+  auto relay = std::make_unique<Relay>(listener.release(), address, std::move(*to), how, seed);
   return std::unique_ptr<FaultProxy>(new FaultProxy(std::move(relay)));
 }
 

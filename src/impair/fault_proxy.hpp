@@ -3,10 +3,10 @@
 #include <cstdint>
 #include <memory>
 #include <string>
-#include <string_view>
 
 #include "base/result.hpp"
 #include "impair/impairment.hpp"
+#include "net/address.hpp"
 
 namespace gimnet::impair {
 
@@ -35,11 +35,10 @@ class FaultProxy {
  public:
   static constexpr std::size_t kConnections = 1024;  ///< further ones wait in the listen queue
 
-  /// Addresses are tcp://HOST:PORT (of `listen`, port 0 for any) and unix:PATH. Equal seeds draw
-  /// equal numbers. Errors: a sentence that names the address. A target that does not answer is no
-  /// error: each connection to it is closed.
-  [[nodiscard]] static Result<std::unique_ptr<FaultProxy>> open(std::string_view listen,
-                                                                std::string_view target,
+  /// Port 0 of `listen` is any free one. Equal seeds draw equal numbers. Errors: a sentence that
+  /// names the address. A target that does not answer is no error: each connection to it is closed.
+  [[nodiscard]] static Result<std::unique_ptr<FaultProxy>> open(const net::Address& listen,
+                                                                const net::Address& target,
                                                                 const Impairment& how,
                                                                 std::uint64_t seed);
   ~FaultProxy();

@@ -52,7 +52,7 @@ std::string Address::url() const {
   return std::string(kTcp) + (numeric_v6 ? "[" + host + "]" : host) + ":" + std::to_string(port);
 }
 
-Result<Address, NetError> parse_address(std::string_view url) {
+Result<Address, NetError> parse_address(std::string_view url, std::uint16_t least_port) {
   Address address;
   if (url.starts_with(kUnix)) {
     address.scheme = Address::Scheme::unix_socket;
@@ -75,8 +75,10 @@ Result<Address, NetError> parse_address(std::string_view url) {
   }
   const std::string_view port = rest.substr(colon + 1);
   const auto parsed = std::from_chars(port.data(), port.data() + port.size(), address.port);
-  if (parsed.ec != std::errc() || parsed.ptr != port.data() + port.size() || address.port == 0) {
-    return not_understood(url, "the port is not a number from 1 to 65535");
+  if (parsed.ec != std::errc() || parsed.ptr != port.data() + port.size() ||
+      address.port < least_port) {
+    return not_understood(
+        url, "the port is not a number from " + std::to_string(least_port) + " to 65535");
   }
   address.host = host;
   return address;

@@ -26,8 +26,9 @@ struct Address {
   friend bool operator==(const Address&, const Address&) = default;
 };
 
-/// An address to dial. Errors: Fault::bad_address with a sentence that names the URL and the forms
-/// that are understood.
-[[nodiscard]] Result<Address, NetError> parse_address(std::string_view url);
+/// An address to dial; with `least_port` 0 one to listen on, where the system may choose the port.
+/// Errors: Fault::bad_address with a sentence that names the URL and the forms that are understood.
+[[nodiscard]] Result<Address, NetError> parse_address(std::string_view url,
+                                                      std::uint16_t least_port = 1);
 
 }  // namespace gimnet::net

@@ -2,12 +2,10 @@
 
 #include <sys/socket.h>
 #include <sys/stat.h>
-#include <sys/un.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <cstring>
 #include <optional>
 #include <string>
 #include <utility>
@@ -85,16 +83,6 @@ Result<StreamPointer, NetError> dial_one(const sockaddr* to, socklen_t size, con
   return finish_dial(std::move(stream), address, deadline, cancel);
 }
 
-Result<StreamPointer, NetError> dial_unix(const Address& address, const SocketOptions& options,
-                                          Deadline deadline, const WakeSignal& cancel) {
-  sockaddr_un to{};
-  static_assert(sizeof to.sun_path == kSocketPathMax + 1);
-  to.sun_family = AF_UNIX;
-  std::memcpy(to.sun_path, address.path.data(), std::min(address.path.size(), kSocketPathMax));
-  return dial_one(reinterpret_cast<const sockaddr*>(&to), sizeof to, address, options, deadline,
-                  cancel);
-}
-
 /// Nothing: all is written.
 std::optional<NetError> write_all(Stream& stream, std::span<const std::byte> bytes,
                                   const Address& address, Deadline deadline,
@@ -160,7 +148,6 @@ std::optional<NetError> await_answer(Stream& stream, DialHandshake& handshake,
 
 Result<StreamPointer, NetError> dial(const Address& address, const SocketOptions& options,
                                      Deadline deadline, const WakeSignal& cancel) {
-  if (is_unix(address)) return dial_unix(address, options, deadline, cancel);
   const auto found = find_addresses(address, deadline, cancel);
   if (!found) return found.error();
   std::optional<NetError> last;

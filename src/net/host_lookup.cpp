@@ -2,12 +2,16 @@
 
 #include <netdb.h>
 #include <sys/socket.h>
+#include <sys/un.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cstddef>
+#include <cstring>
 #include <exception>
 #include <memory>
 #include <optional>
+#include <span>
 #include <system_error>
 #include <thread>
 #include <utility>
@@ -19,6 +23,15 @@ namespace gimnet::net {
 namespace {
 
 constinit std::atomic<int> g_lookups{0};
+
+HostAddress socket_address(const std::string& path) {
+  sockaddr_un address{};
+  static_assert(sizeof address.sun_path == kSocketPathMax + 1);
+  address.sun_family = AF_UNIX;
+  std::memcpy(address.sun_path, path.data(), std::min(path.size(), kSocketPathMax));
+  const auto bytes = std::as_bytes(std::span(&address, 1));
+  return {bytes.begin(), bytes.end()};
+}
 
 HostAddresses ask_system(const std::string& host, std::uint16_t port, int flags) {
   addrinfo hints{};
@@ -88,6 +101,8 @@ bool begin(std::shared_ptr<Search> search, const Address& address, const HostLoo
 
 Result<std::vector<HostAddress>, NetError> find_addresses(const Address& address, Deadline deadline,
                                                           const WakeSignal& cancel) {
+  if (address.scheme == Address::Scheme::unix_socket)
+    return std::vector<HostAddress>{socket_address(address.path)};
   // A number needs nobody to be asked.
   HostAddresses numeric = ask_system(address.host, address.port, AI_NUMERICHOST);
   if (numeric.fault.empty()) return std::move(numeric.found);

@@ -27,14 +27,14 @@ using HostLookup = std::function<HostAddresses(const std::string& host, std::uin
 /// some seconds.
 inline constexpr int kHostLookupsMax = 16;
 
-/// Finds all addresses of a host. Gives up at the deadline or when `cancel` is raised: the
-/// system cannot be told to leave its search for a name, so that goes on without anybody, on a
-/// thread of its own, and is thrown away. Thread safety: any thread. Errors: Fault::no_host,
-/// Fault::timeout, Fault::cancelled, Fault::no_memory. REQUIRES: a TCP address.
+/// Finds all addresses of a host; a Unix socket has one, its path. Gives up at the deadline or when
+/// `cancel` is raised: the system cannot be told to leave its search for a name, so that goes on
+/// without anybody, on a thread of its own, and is thrown away. Thread safety: any thread. Errors:
+/// Fault::no_host, Fault::timeout, Fault::cancelled, Fault::no_memory.
 [[nodiscard]] Result<std::vector<HostAddress>, NetError> find_addresses(const Address& address,
                                                                         Deadline deadline,
                                                                         const WakeSignal& cancel);
-/// The same with another way to look.
+/// The same with another way to look. REQUIRES: a TCP address.
 [[nodiscard]] Result<std::vector<HostAddress>, NetError> find_addresses(const Address& address,
                                                                         Deadline deadline,
                                                                         const WakeSignal& cancel,

@@ -10,7 +10,8 @@ constexpr std::int64_t kMs = 1'000'000;
 class ControlLineTest : public testing::Test {
  protected:
   ControlLineTest() {
-    auto opened = FaultProxy::open("tcp://127.0.0.1:0", "tcp://127.0.0.1:1", {}, 1);
+    auto opened = FaultProxy::open(*net::parse_address("tcp://127.0.0.1:0", 0),
+                                   *net::parse_address("tcp://127.0.0.1:1"), {}, 1);
     EXPECT_TRUE(opened);
     proxy_ = std::move(*opened);
   }

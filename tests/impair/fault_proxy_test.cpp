@@ -46,7 +46,8 @@ class FaultProxyTest : public testing::Test {
   }
 
   void open(const Impairment& how) {
-    auto opened = FaultProxy::open("tcp://127.0.0.1:0", target_, how, 1);
+    auto opened = FaultProxy::open(*net::parse_address("tcp://127.0.0.1:0", 0),
+                                   *net::parse_address(target_), how, 1);
     ASSERT_TRUE(opened) << opened.error().sentence;
     proxy_ = std::move(*opened);
   }
@@ -209,10 +210,11 @@ TEST_F(FaultProxyTest, AResetAtOneEndReachesTheOther) {
 }
 
 TEST(FaultProxy, NamesTheAddressThatCannotBe) {
-  const auto opened = FaultProxy::open("unix:/nonexistent/x", "tcp://127.0.0.1:1", {}, 1);
+  const auto opened = FaultProxy::open(*net::parse_address("unix:/nonexistent/x"),
+                                       *net::parse_address("tcp://127.0.0.1:1"), {}, 1);
   ASSERT_FALSE(opened);
   EXPECT_EQ(opened.error().sentence,
-            "cannot listen on 'unix:/nonexistent/x': No such file or directory");
+            "cannot listen on unix:/nonexistent/x: No such file or directory");
 }
 
 }  // namespace

@@ -29,6 +29,14 @@ TEST(Address, RefusesWhatItDoesNotUnderstand) {
   }
 }
 
+TEST(Address, ToListenOnMayLeaveThePortToTheSystem) {
+  EXPECT_EQ(parse_address("tcp://127.0.0.1:0", 0)->port, 0);
+  const auto wrong = parse_address("tcp://127.0.0.1:port", 0);
+  ASSERT_FALSE(wrong);
+  EXPECT_NE(wrong.error().sentence.find("the port is not a number from 0 to 65535"),
+            std::string::npos);
+}
+
 TEST(Address, SaysWhatWasMeant) {
   const auto said = [](const char* url) { return parse_address(url).error().sentence; };
   EXPECT_TRUE(said("127.0.0.1:7450").ends_with("; did you mean tcp://127.0.0.1:7450?"));

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
+#include <sys/un.h>
 
 #include <condition_variable>
 #include <cstring>
@@ -64,6 +65,19 @@ TEST(HostLookup, ReadsNumbersWithoutAskingAnybody) {
   EXPECT_EQ(ntohs(address.sin_port), 7450);
   EXPECT_EQ(ntohl(address.sin_addr.s_addr), INADDR_LOOPBACK);
   EXPECT_TRUE(find_addresses(address_of("tcp://[::1]:1"), 0, cancel));
+}
+
+TEST(HostLookup, ThePathOfASocketIsItsOneAddress) {
+  const WakeSignal cancel;
+  const std::string path(kSocketPathMax, 'x');
+  const auto found = find_addresses(address_of(("unix:" + path).c_str()), 0, cancel);
+  ASSERT_TRUE(found);
+  ASSERT_EQ(found->size(), 1u);
+  sockaddr_un address{};
+  ASSERT_EQ(found->front().size(), sizeof address);
+  std::memcpy(&address, found->front().data(), sizeof address);
+  EXPECT_EQ(address.sun_family, AF_UNIX);
+  EXPECT_EQ(address.sun_path, path);
 }
 
 TEST(HostLookup, GivesAllThatIsFound) {

@@ -59,7 +59,7 @@ MAY_INCLUDE = {
     "hub": _NET + ("hub",),
     "client/nif": _NIF,
     "client/gimi": _GIMI,
-    "impair": _BASE + ("impair",),
+    "impair": _NET + ("impair",),
     "tools": _GIMI + ("impair", "tools"),
     "examples": _GIMI + ("examples",),
 }

@@ -85,8 +85,8 @@ class Behind(unittest.TestCase):
 
 class Arguments(unittest.TestCase):
     def test_what_is_wrong_is_named(self):
-        for words, part in ((("127.0.0.1:1", "tcp://127.0.0.1:2"), "'127.0.0.1:1' is no address"),
-                            (("tcp://127.0.0.1:0", "tcp://host"), "'tcp://host' lacks the host or the port"),
+        for words, part in ((("127.0.0.1:1", "tcp://127.0.0.1:2"), "'127.0.0.1:1': the scheme is unknown"),
+                            (("tcp://127.0.0.1:0", "tcp://host"), "'tcp://host': the port is missing"),
                             (("tcp://127.0.0.1:0", "unix:x", "--delay", "80"), "'80' is no value for --delay"),
                             (("tcp://127.0.0.1:0",), "target is missing")):
             with self.subTest(words=words):

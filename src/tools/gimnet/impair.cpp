@@ -4,7 +4,6 @@
 #include <charconv>
 #include <cstdint>
 
-#include "impair/address.hpp"
 #include "impair/control_line.hpp"
 #include "impair/fault_proxy.hpp"
 #include "tools/gimnet/command_options.hpp"
@@ -65,13 +64,14 @@ void add_impair(CLI::App& app, ImpairOptions& options) {
 }
 
 ExitCode run_impair(const ImpairOptions& options, StopSignal& stop) {
-  for (const std::string& url : {options.listen, options.target}) {
-    if (const std::string wrong = impair::wrong_form_of(url); !wrong.empty()) {
-      say(wrong);
-      return ExitCode::usage;
-    }
+  const auto listen = net::parse_address(options.listen, 0);
+  const auto target = net::parse_address(options.target);
+  for (const auto* each : {&listen, &target}) {
+    if (*each) continue;
+    say(each->error().sentence);
+    return ExitCode::usage;
   }
-  auto opened = impair::FaultProxy::open(options.listen, options.target, options.how, options.seed);
+  auto opened = impair::FaultProxy::open(*listen, *target, options.how, options.seed);
   if (!opened) {
     say(opened.error().sentence);
     return ExitCode::failed;
