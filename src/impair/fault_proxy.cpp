@@ -17,16 +17,21 @@
 #include <vector>
 
 #include "base/clock.hpp"
-#include "base/descriptor.hpp"
 #include "base/mutex.hpp"
-#include "impair/delayed_channel.hpp"
+#include "impair/relayed_connection.hpp"
 #include "net/host_lookup.hpp"
 
 namespace gimnet::impair {
 namespace {
 
+using End = RelayedConnection::End;
+using Flow = RelayedConnection::Flow;
+
 constexpr std::int64_t kNever = DelayedChannel::kNever;
 constexpr int kBacklog = 128;
+/// A connection for which the system has no descriptor or memory waits so long in the listen
+/// queue: polled again at once, it would be readable and not to be had.
+constexpr std::int64_t kAcceptAgainNs = 50'000'000;
 
 const sockaddr* get(const net::HostAddress& address) {
   return reinterpret_cast<const sockaddr*>(address.data());
@@ -66,43 +71,6 @@ net::Address bound(net::Address address, int descriptor) {
 }
 
 bool would_block(int error) { return error == EAGAIN || error == EWOULDBLOCK || error == EINTR; }
-
-/// One end of a connection.
-struct End {
-  explicit End(int descriptor) : socket(descriptor) {}
-  Descriptor socket;
-  short ready = 0;  ///< what poll(2) said
-};
-
-/// One way: what is read at one end and written at the other.
-struct Flow {
-  explicit Flow(std::uint64_t seed) : channel(seed) {}
-  DelayedChannel channel;
-  bool ended = false;       ///< its sender has ended, or was reset
-  bool reset = false;       ///< it was reset: so is the reader, once it has what came before
-  bool told = false;        ///< the reader was told of the end
-  bool is_blocked = false;  ///< the reader's kernel takes nothing now
-};
-
-struct Connection {
-  Connection(int accepted, int dialled, std::uint64_t seed)
-      : client(accepted), target(dialled), up(seed), down(~seed) {}
-  End client;
-  End target;
-  bool is_connecting = true;
-  bool is_over = false;
-  Flow up;
-  Flow down;
-};
-
-void end_by_reset(Connection& connection) {
-  const linger at_once{1, 0};
-  for (const End* end : {&connection.client, &connection.target}) {
-    static_cast<void>(
-        ::setsockopt(end->socket.get(), SOL_SOCKET, SO_LINGER, &at_once, sizeof at_once));
-  }
-  connection.is_over = true;
-}
 
 }  // namespace
 
@@ -160,10 +128,11 @@ class FaultProxy::Relay {
   void loop();
   void take_orders(std::int64_t now_ns);
   void wait();
-  void accept_all();
-  void serve(Connection& connection, std::int64_t now_ns);
+  void accept_all(std::int64_t now_ns);
+  void serve(RelayedConnection& connection, std::int64_t now_ns);
   void read(Flow& flow, const End& from, std::int64_t now_ns);
-  void write(Connection& connection, Flow& flow, const End& to, Way way, std::int64_t now_ns);
+  void write(RelayedConnection& connection, Flow& flow, const End& to, Way way,
+             std::int64_t now_ns);
   /// Nothing of this way is written before.
   [[nodiscard]] std::int64_t stalled_until_ns(Way way) const;
   [[nodiscard]] std::int64_t drawn(std::int64_t now_ns, std::int64_t mean_ns);
@@ -185,10 +154,11 @@ class FaultProxy::Relay {
   Orders now_;  ///< of this turn
   Relayed done_;
   std::uint64_t cuts_done_ = 0;
+  std::int64_t accept_at_ns_ = INT64_MIN;  ///< the listener is not polled before
   std::int64_t next_stall_ns_ = kNever;
   std::int64_t next_cut_ns_ = kNever;
   std::int64_t drawn_stall_end_ns_ = INT64_MIN;
-  std::list<Connection> connections_;  ///< Limit: kConnections.
+  std::list<RelayedConnection> connections_;  ///< Limit: kConnections.
   std::vector<pollfd> polled_;
   std::array<std::byte, std::size_t{64} << 10> buffer_{};
 };
@@ -208,10 +178,11 @@ void FaultProxy::Relay::loop() {
     const std::int64_t now_ns = steady_now_ns();
     take_orders(now_ns);
     if (!now_.ends) {
-      for (Connection& connection : connections_) serve(connection, now_ns);
-      accept_all();
+      for (RelayedConnection& connection : connections_) serve(connection, now_ns);
+      accept_all(now_ns);
     }
-    std::erase_if(connections_, [](const Connection& connection) { return connection.is_over; });
+    std::erase_if(connections_,
+                  [](const RelayedConnection& connection) { return connection.is_over; });
     done_.connections = connections_.size();
     {
       const MutexLock lock(mutex_);
@@ -241,27 +212,34 @@ void FaultProxy::Relay::take_orders(std::int64_t now_ns) {
   if (!cut_now && cuts_done_ == now_.cuts) return;
   cuts_done_ = now_.cuts;
   done_.cut += connections_.size();
-  for (Connection& connection : connections_) end_by_reset(connection);
+  for (RelayedConnection& connection : connections_) connection.end_by_reset();
 }
 
-void FaultProxy::Relay::accept_all() {
+void FaultProxy::Relay::accept_all(std::int64_t now_ns) {
+  accept_at_ns_ = INT64_MIN;
   while (connections_.size() < kConnections) {
     const int accepted = ::accept4(listener_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
-    if (accepted < 0) return;
+    if (accepted < 0) {
+      const bool exhausted =
+          errno == EMFILE || errno == ENFILE || errno == ENOBUFS || errno == ENOMEM;
+      if (exhausted) accept_at_ns_ = now_ns + kAcceptAgainNs;
+      return;
+    }
     const int on = 1;
     static_cast<void>(::setsockopt(accepted, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on));
     ++done_.accepted;
-    Connection& connection = connections_.emplace_back(accepted, open_socket(target_), random_());
+    RelayedConnection& connection =
+        connections_.emplace_back(accepted, open_socket(target_), random_());
     if (now_.refuses ||
         (::connect(connection.target.socket.get(), get(target_), size_of(target_)) != 0 &&
          errno != EINPROGRESS)) {
       ++done_.refused;
-      end_by_reset(connection);
+      connection.end_by_reset();
     }
   }
 }
 
-void FaultProxy::Relay::serve(Connection& connection, std::int64_t now_ns) {
+void FaultProxy::Relay::serve(RelayedConnection& connection, std::int64_t now_ns) {
   if (connection.is_over) return;
   if (connection.is_connecting && connection.target.ready != 0) {
     int error = 0;
@@ -269,7 +247,7 @@ void FaultProxy::Relay::serve(Connection& connection, std::int64_t now_ns) {
     ::getsockopt(connection.target.socket.get(), SOL_SOCKET, SO_ERROR, &error, &size);
     if (error != 0) {
       ++done_.refused;
-      return end_by_reset(connection);
+      return connection.end_by_reset();
     }
     connection.is_connecting = false;
     connection.target.ready = 0;
@@ -297,13 +275,13 @@ void FaultProxy::Relay::read(Flow& flow, const End& from, std::int64_t now_ns) {
   }
 }
 
-void FaultProxy::Relay::write(Connection& connection, Flow& flow, const End& to, Way way,
+void FaultProxy::Relay::write(RelayedConnection& connection, Flow& flow, const End& to, Way way,
                               std::int64_t now_ns) {
   if (connection.is_over || now_ns < stalled_until_ns(way)) return;
   flow.is_blocked = false;
   for (auto piece = flow.channel.due(now_ns); !piece.empty(); piece = flow.channel.due(now_ns)) {
     const ssize_t took = ::send(to.socket.get(), piece.data(), piece.size(), MSG_NOSIGNAL);
-    if (took < 0 && !would_block(errno)) return end_by_reset(connection);
+    if (took < 0 && !would_block(errno)) return connection.end_by_reset();
     if (took < 0) {
       flow.is_blocked = true;
       return;
@@ -313,14 +291,15 @@ void FaultProxy::Relay::write(Connection& connection, Flow& flow, const End& to,
   }
   if (!flow.ended || flow.told || flow.channel.held() != 0) return;
   flow.told = true;
-  if (flow.reset) return end_by_reset(connection);
+  if (flow.reset) return connection.end_by_reset();
   static_cast<void>(::shutdown(to.socket.get(), SHUT_WR));
 }
 
 void FaultProxy::Relay::wait() {
   std::int64_t wake_ns = std::min(next_stall_ns_, next_cut_ns_);
-  polled_.assign({{event_.get(), POLLIN, 0},
-                  {connections_.size() < kConnections ? listener_.get() : -1, POLLIN, 0}});
+  if (accept_at_ns_ != INT64_MIN) wake_ns = std::min(wake_ns, accept_at_ns_);
+  const bool accepts = connections_.size() < kConnections && accept_at_ns_ == INT64_MIN;
+  polled_.assign({{event_.get(), POLLIN, 0}, {accepts ? listener_.get() : -1, POLLIN, 0}});
   const auto interest = [&](const End& end, const Flow& from, const Flow& to, Way way) {
     short events = 0;
     if (!from.ended && from.channel.room(now_.how) != 0) events |= POLLIN;
@@ -335,7 +314,7 @@ void FaultProxy::Relay::wait() {
     // again.
     polled_.push_back({events == 0 ? -1 : end.socket.get(), events, 0});
   };
-  for (const Connection& connection : connections_) {
+  for (const RelayedConnection& connection : connections_) {
     interest(connection.client, connection.up, connection.down, Way::down);
     if (connection.is_connecting) {
       polled_.push_back({connection.target.socket.get(), POLLOUT, 0});
@@ -349,7 +328,7 @@ void FaultProxy::Relay::wait() {
   eventfd_t ignored = 0;
   static_cast<void>(::eventfd_read(event_.get(), &ignored));
   std::size_t next = 2;
-  for (Connection& connection : connections_) {
+  for (RelayedConnection& connection : connections_) {
     connection.client.ready = polled_[next++].revents;
     connection.target.ready = polled_[next++].revents;
   }

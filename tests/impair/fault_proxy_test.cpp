@@ -3,7 +3,10 @@
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
 #include <netinet/in.h>
+#include <poll.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
+#include <time.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -52,13 +55,15 @@ class FaultProxyTest : public testing::Test {
     proxy_ = std::move(*opened);
   }
 
-  int dial() {
-    const int port = std::stoi(proxy_->url().substr(proxy_->url().rfind(':') + 1));
-    const int descriptor = with_patience(::socket(AF_INET, SOCK_STREAM, 0));
-    const sockaddr_in address = loopback(port);
-    EXPECT_EQ(::connect(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address),
+  void connect(const Descriptor& from) {
+    const sockaddr_in address = loopback(net::parse_address(proxy_->url())->port);
+    EXPECT_EQ(::connect(from.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address),
               0);
-    return descriptor;
+  }
+  int dial() {
+    Descriptor made(with_patience(::socket(AF_INET, SOCK_STREAM, 0)));
+    connect(made);
+    return made.release();
   }
   int accept() { return with_patience(::accept(server_.get(), nullptr, nullptr)); }
 
@@ -188,6 +193,31 @@ TEST_F(FaultProxyTest, RefusesWhileItIsTold) {
   say(client, "x");
   EXPECT_EQ(hear(server, 1), "x");
   EXPECT_EQ(proxy_->relayed().refused, 1u);
+}
+
+std::int64_t processor_ns() {
+  timespec used{};
+  ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &used);
+  return used.tv_sec * 1'000'000'000 + used.tv_nsec;
+}
+
+TEST_F(FaultProxyTest, WithoutADescriptorItRestsAndThenGoesOn) {
+  open({});
+  const Descriptor client(::socket(AF_INET, SOCK_STREAM, 0));
+  rlimit limits{};
+  ::getrlimit(RLIMIT_NOFILE, &limits);
+  rlimit none = limits;
+  none.rlim_cur = static_cast<rlim_t>(Descriptor(::dup(client.get())).get());
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &none), 0);
+  connect(client);
+  const std::int64_t before = processor_ns();
+  pollfd answer{client.get(), POLLIN, 0};
+  EXPECT_EQ(::poll(&answer, 1, 300), 0);
+  EXPECT_LT(processor_ns() - before, 20 * kMs);
+  ::setrlimit(RLIMIT_NOFILE, &limits);
+  const Descriptor server(accept());
+  say(client, "x");
+  EXPECT_EQ(hear(server, 1), "x");
 }
 
 TEST_F(FaultProxyTest, ATargetThatIsNotThereCostsOnlyTheConnection) {
