@@ -3,11 +3,14 @@
 #include <CLI/CLI.hpp>
 #include <charconv>
 #include <cstdint>
+#include <span>
+#include <vector>
 
-#include "impair/control_line.hpp"
+#include "impair/delayed_channel.hpp"
 #include "impair/fault_proxy.hpp"
 #include "tools/gimnet/command_options.hpp"
 #include "tools/gimnet/input.hpp"
+#include "tools/gimnet/json_writer.hpp"
 #include "tools/gimnet/output.hpp"
 #include "tools/gimnet/session.hpp"
 
@@ -38,7 +41,85 @@ void add_setting(CLI::App& command, ImpairOptions& options, const std::string& n
       about);
 }
 
+std::vector<std::string_view> words_of(std::string_view line) {
+  constexpr std::string_view kBlank = " \t\r";
+  std::vector<std::string_view> words;
+  for (;;) {
+    const std::size_t begin = line.find_first_not_of(kBlank);
+    if (begin == std::string_view::npos) return words;
+    line.remove_prefix(begin);
+    words.push_back(line.substr(0, line.find_first_of(kBlank)));
+    line.remove_prefix(words.back().size());
+  }
+}
+
+std::string error(const std::string& sentence) { return "error: " + sentence; }
+
+std::string stall(impair::FaultProxy& proxy, std::span<const std::string_view> words) {
+  impair::Way way = impair::Way::both;
+  if (!words.empty() && (words[0] == "up" || words[0] == "down")) {
+    way = words[0] == "up" ? impair::Way::up : impair::Way::down;
+    words = words.subspan(1);
+  }
+  if (words.size() > 1) return error("stall takes [up|down] [TIME]");
+  std::int64_t duration_ns = impair::DelayedChannel::kNever;
+  if (!words.empty()) {
+    const auto parsed = impair::parse_duration(words[0]);
+    if (!parsed) return error(parsed.error().sentence);
+    duration_ns = *parsed;
+  }
+  proxy.stall(way, duration_ns);
+  return "ok";
+}
+
+std::string status(const impair::FaultProxy& proxy) {
+  const impair::Relayed relayed = proxy.relayed();
+  JsonWriter json;
+  json.begin_object()
+      .member("connections", relayed.connections)
+      .member("accepted", relayed.accepted)
+      .member("refused", relayed.refused)
+      .member("cut", relayed.cut)
+      .member("stalls", relayed.stalls)
+      .member("up_bytes", relayed.up_bytes)
+      .member("down_bytes", relayed.down_bytes);
+  return json.end_object().str();
+}
+
+/// True: it was one of the words that stand alone.
+bool did_plain_word(impair::FaultProxy& proxy, std::string_view word) {
+  if (word == "go") {
+    proxy.go();
+  } else if (word == "cut") {
+    proxy.cut();
+  } else if (word == "refuse" || word == "accept") {
+    proxy.refuse(word == "refuse");
+  } else {
+    return false;
+  }
+  return true;
+}
+
 }  // namespace
+
+std::string obey(impair::FaultProxy& proxy, std::string_view line) {
+  const std::vector<std::string_view> words = words_of(line);
+  if (words.empty()) return "ok";
+  if (words[0] == "stall") return stall(proxy, std::span(words).subspan(1));
+  if (words.size() == 1 && words[0] == "status") return status(proxy);
+  if (words.size() == 1 && did_plain_word(proxy, words[0])) return "ok";
+  if (words.size() != 2) {
+    return error(
+        "'" + std::string(line) +
+        "' is no order: give stall [up|down] [TIME], go, cut, refuse, accept, status, or a "
+        "setting and its value (" +
+        std::string(impair::kSettingNames) + ")");
+  }
+  const auto changed = impair::change_setting(proxy.impairment(), words[0], words[1]);
+  if (!changed) return error(changed.error().sentence);
+  proxy.change(*changed);
+  return "ok";
+}
 
 void add_impair(CLI::App& app, ImpairOptions& options) {
   CLI::App& command = *app.add_subcommand("impair", kImpairAbout);
@@ -83,7 +164,7 @@ ExitCode run_impair(const ImpairOptions& options, StopSignal& stop) {
   LineInput input(0, stop.descriptor());
   std::string_view line;
   while (output.ok() && input.next(line) == LineInput::State::line) {
-    output.write(impair::obey(proxy, line) + "\n");
+    output.write(obey(proxy, line) + "\n");
     output.flush();
   }
   // Without orders it goes on: the input of a program in the background ends at once.

@@ -1,15 +1,18 @@
-#include "impair/control_line.hpp"
+#include "tools/gimnet/impair.hpp"
 
 #include <gtest/gtest.h>
 
-namespace gimnet::impair {
+namespace gimnet::tool {
 namespace {
+
+using impair::FaultProxy;
+using impair::Impairment;
 
 constexpr std::int64_t kMs = 1'000'000;
 
-class ControlLineTest : public testing::Test {
+class ImpairTest : public testing::Test {
  protected:
-  ControlLineTest() {
+  ImpairTest() {
     auto opened = FaultProxy::open(*net::parse_address("tcp://127.0.0.1:0", 0),
                                    *net::parse_address("tcp://127.0.0.1:1"), {}, 1);
     EXPECT_TRUE(opened);
@@ -20,7 +23,7 @@ class ControlLineTest : public testing::Test {
   std::unique_ptr<FaultProxy> proxy_;
 };
 
-TEST_F(ControlLineTest, ChangesOneSettingAndLeavesTheOthers) {
+TEST_F(ImpairTest, ChangesOneSettingAndLeavesTheOthers) {
   EXPECT_EQ(say("delay 80ms"), "ok");
   EXPECT_EQ(say("  rate\t1MB \r"), "ok");
   EXPECT_EQ(proxy_->impairment(), (Impairment{.delay_ns = 80 * kMs, .rate = 1'000'000}));
@@ -28,7 +31,7 @@ TEST_F(ControlLineTest, ChangesOneSettingAndLeavesTheOthers) {
   EXPECT_EQ(proxy_->impairment(), Impairment{.rate = 1'000'000});
 }
 
-TEST_F(ControlLineTest, TakesItsOrders) {
+TEST_F(ImpairTest, TakesItsOrders) {
   for (const char* line :
        {"", "stall", "stall up", "stall down 5ms", "stall 5ms", "go", "cut", "refuse", "accept"})
     EXPECT_EQ(say(line), "ok") << line;
@@ -37,7 +40,7 @@ TEST_F(ControlLineTest, TakesItsOrders) {
             "\"down_bytes\":0}");
 }
 
-TEST_F(ControlLineTest, SaysWhatIsWrongAndChangesNothing) {
+TEST_F(ImpairTest, SaysWhatIsWrongAndChangesNothing) {
   const auto tells = [&](std::string_view line, std::string_view part) {
     const std::string answer = say(line);
     EXPECT_TRUE(answer.starts_with("error: ")) << line;
@@ -53,4 +56,4 @@ TEST_F(ControlLineTest, SaysWhatIsWrongAndChangesNothing) {
 }
 
 }  // namespace
-}  // namespace gimnet::impair
+}  // namespace gimnet::tool
