@@ -17,7 +17,6 @@
 #include <string_view>
 #include <vector>
 
-#include "bench/hub/data/support/null_stream.hpp"
 #include "client/gimi/clerk.hpp"
 #include "client/nif/name_cache.hpp"
 #include "client/nif/pause_table.hpp"
@@ -29,7 +28,7 @@
 #include "hub/control/table_publisher.hpp"
 #include "proto/control/fields.hpp"
 #include "proto/control/pattern.hpp"
-#include "tests/hub/data/support/route_rig.hpp"
+#include "tests/perf/growth.hpp"
 
 extern "C" {
 /// Where callgrind switches its counting on and off: never inlined, known by this name.
@@ -41,15 +40,15 @@ extern "C" {
 }
 
 namespace gimnet::hub {
-namespace {
 
-using std::chrono::milliseconds;
-using Work = std::function<void()>;
-
-[[noreturn]] void wrong(const char* what) {
+void wrong(const char* what) {
   std::fprintf(stderr, "growth_scripts: %s\n", what);
   std::exit(1);
 }
+
+namespace {
+
+using std::chrono::milliseconds;
 
 /// A message of so many values under one key.
 Work duplicate_keys(std::size_t count) {
@@ -246,28 +245,6 @@ Work subscribers(std::size_t count) {
   };
 }
 
-/// Sessions of so many nodes end, one after the other, each with one service whose last message the
-/// hub keeps.
-Work retained(std::size_t count) {
-  struct World {
-    testing::RouteRig rig;
-    Run message = rig.make_run(7u << 20 | 1, {"last"}, {.kind = proto::Kind::group});
-  };
-  auto world = std::make_shared<World>();
-  return [world, count] {
-    RetainedMessages& kept = world->rig.retained;
-    for (std::uint32_t i = 1; i <= count; ++i) {
-      proto::FrameHeader header = world->message.header();
-      header.dst = make_id<GroupId>(HubId{7}, i).value();
-      header.src = make_id<NodeId>(HubId{7}, i).value();
-      kept.keep(world->message, header, world->message.size);
-    }
-    if (kept.groups() != count) wrong("a message was not kept");
-    for (std::uint32_t i = 1; i <= count; ++i) kept.forget_provider(make_id<NodeId>(HubId{7}, i));
-    if (kept.groups() != 0) wrong("a message outlived its provider's session");
-  };
-}
-
 /// Looks for what is in hall-3 among so many names that begin with the same letters, as often.
 Work neighbours(std::size_t count) {
   struct World {
@@ -321,41 +298,6 @@ Work pattern_parts(std::size_t count) {
   name.back() = 'b';
   return [pattern, name] {
     if (pattern->matches(name) != (name.size() == 1)) wrong("that name does not fit");
-  };
-}
-
-/// So many frames of 16 bytes in turns to the same 8 nodes of a hub that has an eightieth as many
-/// nodes, 800 a turn.
-Work forwarding(std::size_t count) {
-  constexpr std::uint32_t kFirstNode = 2;
-  constexpr std::uint32_t kDestinations = 8;
-  struct World {
-    hub::testing::RouteRig rig;
-    benchmarks::NullStream transport;
-    std::vector<GatherWriter> writers;
-    std::vector<hub::Run> runs;
-  };
-  const auto nodes = static_cast<std::uint32_t>(count / 80);
-  auto world = std::make_shared<World>();
-  world->writers = std::vector<GatherWriter>(kFirstNode + nodes);
-  for (std::uint32_t i = 0; i < nodes; ++i) world->rig.add_here(kFirstNode + i);
-  for (std::uint32_t i = 0; i < kDestinations; ++i) {
-    const auto node = make_id<NodeId>(HubId{7}, kFirstNode + i * (nodes / kDestinations)).value();
-    world->runs.push_back(world->rig.make_run(node, {"0123456789abcdef"}));
-  }
-  return [world, count] {
-    for (std::size_t i = 1; i <= count; ++i) {
-      const hub::Run& run = world->runs[i % kDestinations];
-      world->rig.router.route(run.buffer, {run.bytes, run.size, run.frames, run.size});
-      if (i % 800 != 0) continue;
-      for (Recipient* recipient : world->rig.recipients.dirty()) {
-        recipient->dirty = false;
-        static_cast<void>(world->writers[recipient->slot.value()].flush(
-            recipient->outbox, nullptr, world->transport, world->rig.egress.context));
-        recipient->outbox.on_emptied(world->rig.egress.context);
-      }
-      world->rig.recipients.dirty().clear();
-    }
   };
 }
 

@@ -12,11 +12,8 @@ from comments import comments_open_with_their_subject  # noqa: E402
 
 FILE_LINES_MAX = 400
 # Grew beyond it when the columns went from 120 to 100; each leaves the list with its next change.
-FILE_LINES_EXCUSED = ("include/gimnet/nif.h",
-                      "tests/client/gimi/service_table_moves_test.cpp", "tests/client/nif/declarations_test.cpp",
-                      "tests/client/nif/outbound_send_test.cpp", "tests/hub/control/handle/administer_test.cpp",
-                      "tests/hub/control/state/membership_test.cpp", "tests/hub/shard/reader_test.cpp",
-                      "tests/proto/frame/frame_parser_test.cpp", "tests/perf/growth.cpp")
+FILE_LINES_EXCUSED = ("include/gimnet/nif.h", "tests/client/gimi/service_table_moves_test.cpp",
+                      "tests/hub/control/handle/administer_test.cpp")
 LINE_COLUMNS_MAX = 100
 FUNCTION_LINES_MAX = 59
 UNTESTED_LIST = "tests/style/untested_sources.txt"
