@@ -50,9 +50,9 @@ struct Node {
 class ShardWorld {
  public:
   ShardWorld()
-      : shared_{kHub,        limits_,   nodes_,           groups_,
-                quiescence_, budget_,   retained_budget_, inbox_,
-                {&mailbox_}, {&waker_}, {&counters_},     {&sessions_}},
+      : shared_{kHub,        limits_,      nodes_,           groups_, routes_,
+                quiescence_, budget_,      retained_budget_, inbox_,  {&mailbox_},
+                {&waker_},   {&counters_}, {&sessions_}},
         shard_(std::make_unique<IoShard>(ShardIndex{0}, shared_, IoShard::Options{})) {
     for (std::uint32_t i = 0; i < 2; ++i) {
       node_[i].id = make_id<NodeId>(kHub, i + 1);
@@ -237,6 +237,7 @@ class ShardWorld {
   const Limits limits_ = small_limits();
   NodeTable nodes_;
   GroupTable groups_;
+  RouteTable routes_;
   Quiescence quiescence_{1};
   Budget budget_{limits_.budget_bytes};
   Budget retained_budget_{limits_.retained_budget_bytes};

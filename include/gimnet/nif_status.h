@@ -85,9 +85,10 @@ typedef enum nif_drop_reason {
   NIF_DROP_NO_SUBSCRIBER = 18,
   NIF_DROP_MALFORMED = 19,
   NIF_DROP_WRONG_SOURCE = 20,
-  NIF_DROP_NOT_RETAINED =
-      21 /**< Of a NIF_REPORT only: the message reached the subscribers of an own
-            service with retain, but its hub does not keep it for later ones. */
+  /** Of a NIF_REPORT only: the message reached the subscribers of an own service with retain, but
+   * its hub does not keep it for later ones. */
+  NIF_DROP_NOT_RETAINED = 21,
+  NIF_DROP_LINK_UNSURE = 22 /**< A link between two hubs broke: it may have arrived. */
 } nif_drop_reason;
 
 #ifdef __cplusplus

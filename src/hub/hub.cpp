@@ -6,6 +6,7 @@
 
 #include "base/clock.hpp"
 #include "base/log.hpp"
+#include "base/random.hpp"
 #include "hub/config/folders.hpp"
 #include "hub/config/reloader.hpp"
 #include "hub/config/state_folder.hpp"
@@ -88,7 +89,8 @@ struct Ground {
         retained_budget(options.limits.retained_budget_bytes),
         inbox(options.shards) {
     // As many as a reload may allow: what is not used costs nothing.
-    const std::uint64_t nodes_most = find_limit("nodes")->most + find_limit("administrators")->most;
+    const std::uint64_t nodes_most =
+        find_limit("nodes")->most + find_limit("administrators")->most + Links::kLinksMax;
     for (std::size_t i = 0; i < options.shards; ++i) {
       wakers.push_back(std::make_unique<Waker>());
       mailboxes.push_back(std::make_unique<Mailbox>(
@@ -105,6 +107,7 @@ struct Ground {
                      .limits = options.limits,
                      .nodes = nodes,
                      .groups = groups,
+                     .routes = routes,
                      .quiescence = quiescence,
                      .budget = budget,
                      .retained_budget = retained_budget,
@@ -122,6 +125,7 @@ struct Ground {
 
   NodeTable nodes;
   GroupTable groups;
+  RouteTable routes;
   Quiescence quiescence;
   Budget budget;
   Budget retained_budget;
@@ -178,13 +182,22 @@ struct Hub::Parts {
                                     ground.readable_sessions,
                                     &ground.refusals,
                                     [this] { return reloader.read_again(); },
-                                    [this](LogLevel level) { reloader.note_log_level(level); }}) {
+                                    [this](LogLevel level) { reloader.note_log_level(level); },
+                                    network()}) {
     for (const auto& listener : listeners) {
       addresses += (addresses.empty() ? "" : " ") + listener->url().text();
     }
     loop = std::make_unique<ConductorLoop>(
-        ConductorLoop::Wiring{conductor, ground.inbox, limits, ground.refusals},
+        ConductorLoop::Wiring{conductor, ground.inbox, limits, ground.refusals, dialler},
         std::move(listeners));
+  }
+
+  Conductor::Wiring::Network network() {
+    const auto dial = [this](LinkNumber link, const DialledLink& to, const proto::Hello& hello) {
+      dialler.dial(link, to, hello,
+                   {.send_bytes = static_cast<std::uint32_t>(limits.socket_send_bytes)});
+    };
+    return {ground.routes, options.links, dial, wall_now_ns, random_bits};
   }
 
   StateKeeper::Keep keep_state() {
@@ -199,6 +212,7 @@ struct Hub::Parts {
   Ground ground;
   const HubShared shared;
   Shards shards;
+  LinkDialler dialler;
   Conductor conductor;
   std::string addresses;
   std::unique_ptr<ConductorLoop> loop;

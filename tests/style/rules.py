@@ -29,7 +29,8 @@ _HUB_PARTS = ("hub/limits.hpp", "hub/observe/counters.hpp", "hub/observe/session
 _CONCURRENT = _PROTO + _HUB_PARTS + ("hub/concurrent",)
 _DATA = _CONCURRENT + ("net/stream.hpp", "hub/data")
 _SHARD = _DATA + ("net", "hub/shard")
-_CONTROL = _SHARD + ("hub/version.hpp", "hub/observe", "hub/crypto", "hub/control")
+_CONTROL = _SHARD + ("hub/version.hpp", "hub/observe", "hub/crypto", "hub/network/state",
+                     "hub/control")
 _NIF = _NET + ("client/nif",)
 _GIMI = _NIF + ("client/gimi",)
 MAY_INCLUDE = {

@@ -65,6 +65,7 @@ enum class LossReason : std::uint8_t {
   no_subscriber = 18,
   malformed = 19,
   wrong_source = 20,
+  link_unsure = 22,
   // As this node knows by itself.
   not_received = 64,     ///< Its receiver answered a later question, but did not get it.
   refused = 65,          ///< Its receiver does not take it: it is too large.

@@ -74,6 +74,16 @@ Conductor::Conductor(HubFacts facts, Placement placement, Limits& limits, Wiring
       runner_({facts_, wiring_.shards, membership_, watches_, publisher_, keeper_}),
       returns_published_(membership_.sessions().returns_until().has_value()) {
   GIMNET_CHECK(wiring_.shards.shards() == facts_.shards);
+  if (wiring_.network) {
+    links_ = std::make_unique<Links>(
+        wiring_.network->options,
+        Links::Wiring{facts_, limits_, wiring_.shards, membership_.sessions().slots(),
+                      wiring_.network->routes, wiring_.network->dial, wiring_.network->random});
+    overview_ = std::make_unique<NetworkOverview>(
+        NetworkOverview::Parts{facts_, *links_, wiring_.sessions});
+    remote_requests_ =
+        std::make_unique<RemoteRequests>(RemoteRequests::Parts{facts_, wiring_.shards, *links_});
+  }
   if (returns_published_) expect_all(wiring_.start.nodes.used, wiring_.tables.nodes);
 }
 
@@ -81,6 +91,8 @@ std::optional<Goodbye> Conductor::admit(Stranger& stranger, const proto::Hello& 
                                         Moment moment) {
   if (draining_)
     return Goodbye{GoodbyeCode::draining, "the hub is shutting down; connect to another one"};
+  if (hello.role == proto::Role::hub && links_ != nullptr)
+    return links_->admit(stranger, hello, {moment.now, moment.wall_ns});
   JoinRequest request;
   request.role = hello.role;
   request.name = hello.name;
@@ -158,10 +170,14 @@ proto::Welcome Conductor::welcome(const Session& session, const proto::Hello& he
 }
 
 void Conductor::on_event(ShardEvent event, milliseconds now) {
+  const auto is_link = [this](NodeId node) {
+    return links_ != nullptr && index_of(node) == kHubIndex;
+  };
   if (const auto* frame = std::get_if<ControlFrameEvent>(&event.what)) {
-    on_frame(*frame, now);
+    is_link(frame->node) ? on_link_frame(*frame, now) : on_frame(*frame, now);
   } else if (const auto* detached = std::get_if<DetachedEvent>(&event.what)) {
-    on_detached(*detached, now);
+    is_link(detached->node) ? links_->on_detached(*detached, moment(now))
+                            : on_detached(*detached, now);
   } else if (std::holds_alternative<DrainedEvent>(event.what) && shards_to_drain_ > 0) {
     --shards_to_drain_;
   }
@@ -193,16 +209,20 @@ void Conductor::on_frame(const ControlFrameEvent& event, milliseconds now) {
     return close(*session, GoodbyeCode::not_allowed, "frames of that kind are between hubs only");
   }
   Effects effects;
-  HandlerContext context{facts_, limits_, membership_,      watches_,         wiring_.counters,
-                         now,    effects, wiring_.sessions, wiring_.refusals, &request_counters_,
-                         this};
+  HandlerContext context = context_for(effects, now);
   const Request request{*session, view->header, payload};
   const NodeId dst{header.dst};
   const bool is_ours = dst == NodeId{} || dst == make_id<NodeId>(facts_.id, kHubIndex);
+  const ShardIndex shard = session->place.shard;
+  std::optional<proto::Refusal> refusal;
+  if (!is_ours && remote_requests_ != nullptr) {
+    refusal = remote_requests_->send_on(event, shard, now);
+    if (!refusal) return;
+  }
   const Handler handle =
       is_ours ? handler_for(session->role, kind, view->header.operation) : handle_for_another;
-  const ShardIndex shard = session->place.shard;
-  const proto::Payload answer = handle(context, request);
+  const proto::Payload answer =
+      refusal ? proto::encode_refusal(view->header, *refusal) : handle(context, request);
   const proto::Status status = proto::peek_status(answer);
   request_counters_.count(kind, view->header.operation, status);
   runner_.carry_out(effects, now);
@@ -214,6 +234,34 @@ void Conductor::on_frame(const ControlFrameEvent& event, milliseconds now) {
   command.counts = context.counts;
   wiring_.shards.send(shard, std::move(command));
   if (is_odd(status)) on_oddity(event, now);
+}
+
+HandlerContext Conductor::context_for(Effects& effects, milliseconds now) {
+  HandlerContext context{facts_, limits_, membership_,      watches_,         wiring_.counters,
+                         now,    effects, wiring_.sessions, wiring_.refusals, &request_counters_,
+                         this};
+  if (links_ != nullptr) {
+    context.network = overview_.get();
+    context.names = &links_->names();
+  }
+  return context;
+}
+
+void Conductor::on_link_frame(const ControlFrameEvent& event, milliseconds now) {
+  const proto::Kind kind = proto::load_header(event.frame.data()).kind;
+  const std::span<const std::byte> payload = std::span{event.frame}.subspan(proto::kHeaderSize);
+  if (kind == proto::Kind::route)
+    return links_->on_route(event.session, event.attachment, payload, moment(now));
+  if (!remote_requests_->take(event, now)) return;
+  const auto view = proto::split_control(payload);
+  if (!view) return;
+  Effects effects;  // nothing that is asked from afar has any
+  HandlerContext context = context_for(effects, now);
+  static const Session kAfar{};
+  const Handler handle = may_be_asked_from_afar(kind, view->header.operation)
+                             ? handler_for(proto::Role::node, kind, view->header.operation)
+                             : handle_denied_from_afar;
+  remote_requests_->answer(event, handle(context, {kAfar, view->header, payload}));
 }
 
 void Conductor::on_oddity(const ControlFrameEvent& event, milliseconds now) {
@@ -255,6 +303,10 @@ void Conductor::close(const Session& session, GoodbyeCode code, std::string sent
 }
 
 void Conductor::tick(milliseconds now) {
+  if (links_ != nullptr) {
+    links_->tick(moment(now));
+    remote_requests_->tick(now);
+  }
   Effects effects;
   membership_.tick(now, effects);
   if (keeper_.again_at() && *keeper_.again_at() <= now) effects.emplace_back(StateDue{});
@@ -272,7 +324,10 @@ std::optional<milliseconds> Conductor::next_deadline() const {
   std::optional<milliseconds> deadline = membership_.next_deadline();
   const auto returns_until =
       returns_published_ ? membership_.sessions().returns_until() : std::nullopt;
-  for (const std::optional<milliseconds>& other : {keeper_.again_at(), returns_until}) {
+  const auto links_due = links_ != nullptr ? links_->next_deadline() : std::nullopt;
+  const auto answers_due = links_ != nullptr ? remote_requests_->next_due() : std::nullopt;
+  for (const std::optional<milliseconds>& other :
+       {keeper_.again_at(), returns_until, links_due, answers_due}) {
     if (other && (!deadline || *other < *deadline)) deadline = other;
   }
   return deadline;
@@ -281,6 +336,7 @@ std::optional<milliseconds> Conductor::next_deadline() const {
 void Conductor::drain() {
   if (draining_) return;
   draining_ = true;
+  if (links_ != nullptr) links_->drain();
   shards_to_drain_ = facts_.shards;
   for (std::size_t i = 0; i < shards_to_drain_; ++i) {
     wiring_.shards.send(ShardIndex{static_cast<std::uint8_t>(i)}, DrainCommand{limits_.drain_ms});

@@ -11,6 +11,9 @@
 #include "hub/control/effect_runner.hpp"
 #include "hub/control/handle/request.hpp"
 #include "hub/control/hub_facts.hpp"
+#include "hub/control/links.hpp"
+#include "hub/control/network_overview.hpp"
+#include "hub/control/remote_requests.hpp"
 #include "hub/control/shard_proxy.hpp"
 #include "hub/control/state/hub_state.hpp"
 #include "hub/control/state/membership.hpp"
@@ -43,6 +46,15 @@ class Conductor final : private Administration {
     ReadAgain read_again{};  ///< or none: the configuration stays as it is
     std::function<void(LogLevel)>
         note_log_level{};  ///< told of levels that were set by request; or none
+    /// Links to other hubs.
+    struct Network {
+      RouteTable& routes;
+      LinksOptions options;
+      Links::Dial dial;
+      std::function<std::int64_t()> wall_now_ns;  ///< since 1970
+      std::function<std::uint64_t()> random;      ///< 64 bits that nobody can guess
+    };
+    std::optional<Network> network{};  ///< or none: a hub alone
   };
   /// `limits` is what the conductor's thread goes by; reload() changes it.
   Conductor(HubFacts facts, Placement placement, Limits& limits, Wiring wiring);
@@ -57,6 +69,11 @@ class Conductor final : private Administration {
                                                     Moment moment);
 
   void on_event(ShardEvent event, std::chrono::milliseconds now);
+  /// REQUIRES: Wiring::network, whose `dial` asked for it.
+  void on_dialled(LinkNumber link, Result<net::Welcomed, net::NetError> outcome,
+                  std::chrono::milliseconds now) {
+    links_->on_dialled(link, std::move(outcome), moment(now));
+  }
 
   /// As long as something runs out, tick() is to be called so often: from a call that comes later
   /// than that one sees that the hub stood still (stopped, or without a processor), and for how
@@ -97,6 +114,11 @@ class Conductor final : private Administration {
   [[nodiscard]] proto::Welcome welcome(const Session& session, const proto::Hello& hello,
                                        Moment moment) const;
   void on_frame(const ControlFrameEvent& event, std::chrono::milliseconds now);
+  void on_link_frame(const ControlFrameEvent& event, std::chrono::milliseconds now);
+  [[nodiscard]] HandlerContext context_for(Effects& effects, std::chrono::milliseconds now);
+  [[nodiscard]] Links::Moment moment(std::chrono::milliseconds now) const {
+    return {now, wiring_.network ? wiring_.network->wall_now_ns() : 0};
+  }
   /// Closes a connection that asks too often for what it cannot have.
   void on_oddity(const ControlFrameEvent& event, std::chrono::milliseconds now);
   /// The node has read the WELCOME of that connection.
@@ -122,7 +144,10 @@ class Conductor final : private Administration {
   TablePublisher publisher_;
   RequestCounters request_counters_;
   StateKeeper keeper_;
-  EffectRunner runner_;  ///< on all of these
+  EffectRunner runner_;                              ///< on all of these
+  std::unique_ptr<Links> links_;                     ///< nullptr: a hub alone
+  std::unique_ptr<NetworkOverview> overview_;        ///< with links_
+  std::unique_ptr<RemoteRequests> remote_requests_;  ///< with links_
   bool returns_published_ =
       false;  ///< after a restart: to the shards nodes that are not back yet count as away
   bool drain_wanted_ = false;

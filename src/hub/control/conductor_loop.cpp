@@ -75,6 +75,7 @@ struct ConductorLoop::Impl {
             parts.refusals),
         strangers_watch(context, strangers.descriptor()),
         inbox_watch(context, parts.inbox.waker().descriptor()),
+        dialler_watch(context, parts.dialler.waker().descriptor()),
         timer(context),
         signals(context, SIGTERM, SIGINT),
         reloads(context, SIGHUP) {
@@ -187,6 +188,23 @@ struct ConductorLoop::Impl {
     asio::post(context, [this] { take_events(); });
   }
 
+  void take_dialled() {
+    wiring.dialler.waker().awake();
+    look_whether_it_stood();
+    for (auto& [link, outcome] : wiring.dialler.take_ended())
+      wiring.conductor.on_dialled(link, std::move(outcome), now());
+    arm_timer();
+    watch_dialler();
+  }
+
+  void watch_dialler() {
+    wiring.dialler.waker().prepare_to_sleep();
+    dialler_watch.wait([this] {
+      wiring.dialler.waker().clear();
+      take_dialled();
+    });
+  }
+
   /// What is left waits behind strangers, timers and events.
   void serve_watches() {
     if (serving_watches || !wiring.conductor.serve_watches(now())) return;
@@ -286,6 +304,7 @@ struct ConductorLoop::Impl {
   std::vector<std::unique_ptr<net::Stream>> leaving;  ///< to be seen off by `strangers`
   Watch strangers_watch;
   Watch inbox_watch;
+  Watch dialler_watch;
   asio::steady_timer timer;
   std::optional<milliseconds> armed;  ///< when the timer fires, or is seen to have been late
   std::optional<asio::steady_timer> drain_deadline;
@@ -307,6 +326,7 @@ void ConductorLoop::run() {
   impl_->watch_strangers();
   impl_->watch_signals();
   impl_->watch_reloads();
+  impl_->take_dialled();
   impl_->take_events();
   impl_->context.run();
 }

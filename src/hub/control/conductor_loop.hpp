@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "hub/control/conductor.hpp"
+#include "hub/control/link_dialler.hpp"
 #include "hub/control/listener.hpp"
 #include "hub/limits.hpp"
 #include "hub/observe/refusal_counters.hpp"
@@ -22,6 +23,7 @@ class ConductorLoop {
     ControlInbox& inbox;
     const Limits& limits;
     RefusalCounters& refusals;
+    LinkDialler& dialler;
   };
   ConductorLoop(const Wiring& wiring, std::vector<std::unique_ptr<Listener>> listeners);
   ~ConductorLoop();

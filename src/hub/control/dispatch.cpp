@@ -1,5 +1,6 @@
 #include "hub/control/dispatch.hpp"
 
+#include <algorithm>
 #include <array>
 
 #include "hub/control/handle/admin.hpp"
@@ -69,6 +70,24 @@ Handler handler_for(Role role, Kind kind, std::uint16_t operation) {
     return (entry.roles & mask_of(role)) != 0 ? entry.handler : handle_denied;
   }
   return handle_unknown;
+}
+
+bool may_be_asked_from_afar(Kind kind, std::uint16_t operation) {
+  constexpr std::array kNames{ns::Resolve::kOperation, ns::Reverse::kOperation,
+                              ns::List::kOperation, ns::Services::kOperation};
+  constexpr std::array kAdmin{ctrl::HubInfo::kOperation, ctrl::Statistics::kOperation,
+                              ctrl::Connections::kOperation, ctrl::Routes::kOperation};
+  const auto has = [operation](const auto& all) {
+    return std::ranges::find(all, operation) != all.end();
+  };
+  return kind == Kind::ns ? has(kNames) : has(kAdmin);
+}
+
+proto::Payload handle_denied_from_afar(HandlerContext&, const Request& request) {
+  return proto::encode_refusal(
+      request.header, {proto::Status::denied,
+                       "from another hub this can be asked for when identities travel; connect to "
+                       "the hub itself"});
 }
 
 proto::Payload handle_for_another(HandlerContext& context, const Request& request) {

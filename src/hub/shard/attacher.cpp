@@ -38,6 +38,11 @@ void Attacher::attach(AttachCommand command) {
   connection.read_again = Backoff{};
   connection.goes_on = false;
   connection.ingress.node = connection.node;
+  if (command.link) {
+    connection.link = std::make_unique<LinkPeer>(
+        LinkPeer{std::move(command.link->rule), command.link->silent_ms});
+    connection.ingress.link = &connection.link->rule;
+  }
   connection.posted_shards = kAllShards;
   state_.counters.connections.add(1);
   const std::uint64_t gap = settle_counts(connection, command);
@@ -52,6 +57,11 @@ void Attacher::attach(AttachCommand command) {
     closer_.close(connection, proto::GoodbyeCode::no_memory,
                   "the hub cannot wait for another connection; try later");
     return;
+  }
+  if (command.link && command.link->dialled) {
+    if (gap != 0)
+      send_flow(state_, connection, proto::flow::Skip{proto::DropReason::link_lost, gap});
+    return state_.recipients.mark_dirty(connection);
   }
   welcome(connection, command.welcome, gap);
   if (connection.connected) tell_again(connection, command);
@@ -93,9 +103,13 @@ Connection& Attacher::session_of(const AttachCommand& command) {
 
 std::uint64_t Attacher::settle_counts(Connection& connection, AttachCommand& command) {
   Run partial = connection.writer.take_partial();
-  const bool same_life = command.resume_wanted && connection.resume != nullptr &&
-                         command.known_hub_epoch == connection.resume->hub_epoch &&
-                         command.peer_epoch == connection.resume->peer_epoch;
+  bool same_life = command.resume_wanted && connection.resume != nullptr &&
+                   command.peer_epoch == connection.resume->peer_epoch;
+  if (command.link && command.link->dialled) {
+    same_life = same_life && command.link->resumed;
+  } else {
+    same_life = same_life && command.known_hub_epoch == connection.resume->hub_epoch;
+  }
   std::uint64_t gap = 0;
   command.welcome.resumed = same_life && go_on(connection, command, partial, gap);
   if (!command.welcome.resumed) begin_anew(connection, command, partial);
@@ -103,7 +117,7 @@ std::uint64_t Attacher::settle_counts(Connection& connection, AttachCommand& com
   if (connection.resume) {
     command.welcome.epoch = connection.resume->hub_epoch;
     command.welcome.taken = connection.resume->taken;
-    command.welcome.resume_buffer_bytes = static_cast<std::uint32_t>(state_.limits.resume_bytes);
+    command.welcome.resume_buffer_bytes = static_cast<std::uint32_t>(resume_bytes(connection));
   }
   return gap;
 }
@@ -140,11 +154,16 @@ void Attacher::begin_anew(Connection& connection, const AttachCommand& command,
   connection.resume.reset();
   count_anew(connection);
   if (!command.resume_wanted) return;
-  connection.resume = std::make_unique<ResumeState>(state_.limits.resume_bytes);
+  connection.resume = std::make_unique<ResumeState>(resume_bytes(connection));
   connection.outbox.set_resume(&connection.resume->kept);
-  connection.resume->hub_epoch = random_epoch();
+  const bool dialled = command.link && command.link->dialled;
+  connection.resume->hub_epoch = dialled ? command.link->epoch : random_epoch();
   connection.resume->peer_epoch = command.peer_epoch;
   connection.resume->peer_resume_bytes = command.peer_resume_bytes;
+}
+
+std::uint64_t Attacher::resume_bytes(const Connection& connection) const {
+  return connection.is_link() ? kLinkResumeBytes : state_.limits.resume_bytes;
 }
 
 /// What was on its way to the subscriber is lost, and both ends count its messages from 0.

@@ -23,6 +23,7 @@ class Attacher {
   /// False: the peer's count cannot be; `partial` is still there.
   [[nodiscard]] bool go_on(Connection& connection, const AttachCommand& command, Run& partial,
                            std::uint64_t& gap);
+  [[nodiscard]] std::uint64_t resume_bytes(const Connection& connection) const;
   void begin_anew(Connection& connection, const AttachCommand& command, const Run& partial);
   void count_anew(Connection& connection);
   void welcome(Connection& connection, const proto::Welcome& welcome, std::uint64_t gap);

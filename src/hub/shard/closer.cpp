@@ -113,23 +113,31 @@ void Closer::lose_all(Connection& connection) {
 
 void Closer::tell(const Connection& connection, bool said_by_peer, proto::GoodbyeCode code,
                   std::string sentence) {
+  static const ResumeState kNone{0};
+  const bool resumes = connection.is_link() && connection.resume != nullptr;
+  const ResumeState& resume = resumes ? *connection.resume : kNone;
   state_.tell_conductor(
       {state_.self, DetachedEvent{connection.session(), connection.attachment, connection.node,
-                                  said_by_peer, code, std::move(sentence)}});
+                                  said_by_peer, code, std::move(sentence), resume.hub_epoch,
+                                  resume.peer_epoch, resume.taken}});
 }
 
 void Closer::lose_unconfirmed(Connection& connection, const Run& partial) {
   std::uint64_t lost = 0;
-  const auto lose = [&](const Run& run) {
+  // The hub at the other end of a link goes on: a frame may have arrived there.
+  const auto unsure =
+      connection.is_link() ? proto::DropReason::link_unsure : proto::DropReason::link_lost;
+  const auto lose = [&](const Run& run, proto::DropReason reason) {
     lost += run.frames;
-    state_.drops.drop_mixed(run.bytes, run.size, proto::DropReason::link_lost);
+    state_.drops.drop_mixed(run.bytes, run.size, reason);
   };
   if (connection.resume) {
-    const std::uint64_t let_go = connection.resume->kept.clear(lose);
-    state_.tally.drop(proto::DropReason::link_lost, let_go);
+    const std::uint64_t let_go =
+        connection.resume->kept.clear([&](const Run& run) { lose(run, unsure); });
+    state_.tally.drop(unsure, let_go);
     lost += let_go;
   }
-  if (partial.frames != 0) lose(partial);
+  if (partial.frames != 0) lose(partial, proto::DropReason::link_lost);
   connection.outbox.count_dropped(lost);
   state_.tally.queued -= static_cast<std::int64_t>(lost);
 }

@@ -11,6 +11,7 @@
 #include "base/ids.hpp"
 #include "hub/data/fanout/mailbox.hpp"
 #include "hub/data/fanout/paced_subscription.hpp"
+#include "hub/data/ingress/ingress_gate.hpp"
 #include "hub/limits.hpp"
 #include "net/stream.hpp"
 #include "proto/control/link.hpp"
@@ -42,6 +43,24 @@ struct SessionRef {
 // ---- conductor -> shard
 // --------------------------------------------------------------------------------------------
 
+/// Data frames to a link that are kept until they are confirmed, in bytes: what a link of 1 Gbit/s
+/// carries in a tenth of a second.
+inline constexpr std::uint64_t kLinkResumeBytes = 16 * 1024 * 1024;
+
+/// Control frames that wait for a link, in bytes: the records of 4,000 hubs come at once.
+inline constexpr std::uint64_t kLinkControlBytes = 64 * 1024 * 1024;
+
+/// The other end of a connection is a hub.
+struct LinkAttach {
+  LinkRule rule;
+  std::uint32_t silent_ms = 0;
+  /// This hub dialled: WELCOME was read already, and nothing is written first. `resumed` is what it
+  /// said, `epoch` what HELLO said of this end.
+  bool dialled = false;
+  bool resumed = false;
+  std::uint64_t epoch = 0;
+};
+
 /// An admitted connection for a session, new or come back. The shard fences the session's earlier
 /// connection, if it has one (told `replaced`), fixes its counts, writes the 8 bytes of the opening
 /// and WELCOME, then carries data.
@@ -64,6 +83,7 @@ struct AttachCommand {
   std::uint64_t known_taken = 0;
   std::uint32_t peer_resume_bytes = 0;
   std::uint32_t peer_frame_bytes = 0;
+  std::optional<LinkAttach> link;  ///< nothing: a node
   /// Control frames that the node gets ahead of all that waits for it, whatever their size: events
   /// that it may have missed.
   std::vector<std::byte> told;
@@ -166,7 +186,8 @@ using ShardCommand = std::variant<AttachCommand, SendControlCommand, TellCommand
 // ---- shard -> conductor
 // --------------------------------------------------------------------------------------------
 
-/// A frame of kind NS or CTRL for this hub; `frame` is header and payload.
+/// A frame of kind NS or CTRL, of a link also ROUTE; `frame` is header and payload. `node` is the
+/// sender's, of a link the hub at its other end.
 struct ControlFrameEvent {
   SessionRef session;
   std::uint32_t attachment = 0;  ///< of the connection that it came by
@@ -186,6 +207,10 @@ struct DetachedEvent {
   bool said_by_peer = false;
   proto::GoodbyeCode code{};
   std::string sentence;
+  // Of a link, for the HELLO by which it may be resumed; 0: it cannot be.
+  std::uint64_t epoch = 0;       ///< of this end
+  std::uint64_t peer_epoch = 0;  ///< of the other end
+  std::uint64_t taken = 0;       ///< data frames from the other end
 };
 
 /// A connection to which GOODBYE was written: what its peer still sends is thrown away for a

@@ -32,6 +32,13 @@ struct ResumeState {
   std::uint32_t peer_resume_bytes = 0;  ///< a quarter of it without a CONFIRM is too much
 };
 
+/// The hub at the other end of a link.
+struct LinkPeer {
+  LinkRule rule;
+  std::uint32_t silent_ms = 0;
+  TokenBucket control{};  ///< frames for the conductor
+};
+
 /// A bit set of shards: any of them.
 inline constexpr std::uint64_t kAllShards = ~std::uint64_t{0};
 
@@ -77,6 +84,7 @@ struct Connection : Recipient {
   std::uint64_t sent_bytes = 0;
   std::unique_ptr<Progress> progress;  ///< while something waits
   std::unique_ptr<ResumeState> resume;
+  std::unique_ptr<LinkPeer> link;  ///< nullptr: a node
 
   /// It could not be heard, nor finish a frame, while the hub did not read it.
   void on_read_again(std::uint64_t now_ms) {

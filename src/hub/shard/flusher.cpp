@@ -199,7 +199,7 @@ void Flusher::look_after(Connection& connection) {
   if (taken - progress.taken_bytes >= state_.limits.slow_consumer_bytes || nothing_waits) {
     progress.taken_bytes = taken;
     progress.since_ms = state_.now_ms;
-  } else if (connection.write != WriteState::failed &&
+  } else if (connection.write != WriteState::failed && !connection.is_link() &&
              state_.now_ms - progress.since_ms >= state_.limits.slow_consumer_ms) {
     state_.counters.slow_consumers.add(1);
     closer_.close(connection, proto::GoodbyeCode::slow_consumer,

@@ -278,7 +278,8 @@ void IoShard::execute(ShardCommand& command) {
 }
 
 void IoShard::say(Connection& connection, std::span<const std::byte> frame) {
-  if (connection.outbox.push_control(frame, state_.egress))
+  const std::uint64_t most = connection.is_link() ? kLinkControlBytes : state_.limits.control_bytes;
+  if (connection.outbox.push_control(frame, state_.egress, most))
     return state_.recipients.mark_dirty(connection);
   closer_.close(connection, proto::GoodbyeCode::too_many_requests,
                 "answers wait and are not taken; read what you asked for");

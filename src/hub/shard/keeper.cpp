@@ -40,7 +40,7 @@ void Keeper::forgive(Connection& connection, std::uint64_t late_ms) const {
 
 bool Keeper::is_silent(Connection& connection) {
   const auto over = [&] {
-    return state_.now_ms - connection.last_heard_ms >= state_.limits.silent_ms;
+    return state_.now_ms - connection.last_heard_ms >= silent_ms(connection);
   };
   if (!over()) return false;
   // What it said may lie unread: the hub stood still, the wait for who is ready was interrupted, or
@@ -68,6 +68,8 @@ void Keeper::look_at(Connection& connection) {
                          "the hub's words wait and are not taken, RESUME among them; read what the "
                          "hub says, come back");
   }
+  if (connection.is_link() && connection.write == WriteState::failed)
+    return closer_.on_broken(connection);
   // What a peer sent before it was gone waits for who holds it, but no longer than its session
   // would wait for the peer: it may be held by what waits for itself, and would be for ever.
   if (connection.write == WriteState::failed &&
@@ -79,9 +81,10 @@ void Keeper::look_at(Connection& connection) {
     if (connection.write == WriteState::failed) return closer_.on_broken(connection);
     state_.counters.silent.add(1);
     return closer_.close(connection, proto::GoodbyeCode::silent,
-                         "nothing was heard for " + std::to_string(limits.silent_ms) + " ms");
+                         "nothing was heard for " + std::to_string(silent_ms(connection)) + " ms");
   }
   if (!connection.connected) return;
+  if (connection.is_link()) return look_at_link(connection);
   if (heard && connection.tail_since_ms != 0 &&
       state_.now_ms - connection.tail_since_ms >= limits.stalled_frame_ms) {
     state_.counters.stalled_frames.add(1);
@@ -99,6 +102,16 @@ void Keeper::look_at(Connection& connection) {
     if (!connection.connected) return;
     if (connection.resume) send_confirm(state_, connection);
   }
+  flusher_.look_after(connection);
+}
+
+std::uint64_t Keeper::silent_ms(const Connection& connection) const {
+  return connection.link ? connection.link->silent_ms : state_.limits.silent_ms;
+}
+
+/// The conductor says the keep-alives of links, and no limit for slow or stalled nodes holds.
+void Keeper::look_at_link(Connection& connection) {
+  if (connection.resume) send_confirm(state_, connection);
   flusher_.look_after(connection);
 }
 

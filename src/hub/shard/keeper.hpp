@@ -33,6 +33,8 @@ class Keeper {
 
  private:
   void look_at(Connection& connection);
+  void look_at_link(Connection& connection);
+  [[nodiscard]] std::uint64_t silent_ms(const Connection& connection) const;
   /// This shard did nothing for so long: what is asked of the peer within a time began as much
   /// later.
   void forgive(Connection& connection, std::uint64_t late_ms) const;

@@ -87,6 +87,8 @@ void Reader::wait_for_room(Connection& connection) {
 }
 
 bool Reader::process(Connection& connection, ReceiveBuffer::Received received) {
+  if (connection.link != nullptr) [[unlikely]]
+    return process_link(connection, received);
   const auto length_max = static_cast<std::uint32_t>(state_.limits.frame_bytes);
   const std::byte* next = received.begin;
   state_.router.begin_bytes(connection.node);
@@ -107,21 +109,26 @@ bool Reader::process(Connection& connection, ReceiveBuffer::Received received) {
       next += found.run.size;
       continue;
     }
-    if (found.found == proto::Found::too_long) {
-      connection.ingress.error = proto::FrameError::too_long;
-      return refuse(
-          connection, proto::DropReason::malformed, proto::GoodbyeCode::malformed,
-          "the frame's length is over the largest frame, " + std::to_string(length_max) + " bytes");
-    }
-    if (connection.tail_since_ms == 0 || next != received.begin)
-      connection.tail_since_ms = state_.now_ms;
-    if (keep(connection, {next, received.end}, found.needed)) return true;
-    closer_.close(connection, proto::GoodbyeCode::no_memory,
-                  "the hub keeps too many begun frames; write frames whole, or in smaller pieces");
-    return false;
+    return take_begun(connection, {next, received.end}, next == received.begin, found);
   }
   connection.tail_since_ms = 0;
   return true;
+}
+
+/// Bytes behind the last whole frame.
+[[gnu::noinline]] bool Reader::take_begun(Connection& connection, std::span<const std::byte> begun,
+                                          bool nothing_before, const proto::NextRun& found) {
+  if (found.found == proto::Found::too_long) {
+    connection.ingress.error = proto::FrameError::too_long;
+    return refuse(connection, proto::DropReason::malformed, proto::GoodbyeCode::malformed,
+                  "the frame's length is over the largest frame, " +
+                      std::to_string(state_.limits.frame_bytes) + " bytes");
+  }
+  if (connection.tail_since_ms == 0 || !nothing_before) connection.tail_since_ms = state_.now_ms;
+  if (keep(connection, begun, found.needed)) return true;
+  closer_.close(connection, proto::GoodbyeCode::no_memory,
+                "the hub keeps too many begun frames; write frames whole, or in smaller pieces");
+  return false;
 }
 
 void Reader::keep_rest(Connection& connection, std::span<const std::byte> rest) {
@@ -175,6 +182,7 @@ bool Reader::handle_run(Connection& connection, proto::NextRun& found) {
 }
 
 bool Reader::handle_other(Connection& connection, const proto::RunView& view, Admission admission) {
+  if (connection.is_link()) return handle_from_link(connection, view, admission);
   switch (admission) {
     case Admission::flow:
       return handle_flow(connection, view);
@@ -189,6 +197,8 @@ bool Reader::handle_other(Connection& connection, const proto::RunView& view, Ad
           "a frame's source is not this connection's node id; put the id from WELCOME into src");
     case Admission::data:
     case Admission::malformed:
+    case Admission::hop_limit:
+    case Admission::report:
       break;
   }
   return refuse(
@@ -208,7 +218,8 @@ bool Reader::refuse(Connection& connection, proto::DropReason reason, proto::Goo
 void Reader::route(Connection& connection, const proto::NextRun& found) {
   const proto::RunView& view = found.run;
   count(connection, view);
-  if (proto::load_header(view.bytes).has(proto::kFlagExt)) stamp_arrival(view);
+  if (proto::load_header(view.bytes).has(proto::kFlagExt))
+    stamp_arrival(view, connection.is_link() ? proto::Origin::hub : proto::Origin::node);
   state_.router.route(state_.receive_buffer.buffer(), view);
 }
 
@@ -225,8 +236,8 @@ void Reader::count_taken(Connection& connection, const proto::RunView& view) {
 }
 
 /// TRACE gets the time of arrival, and an AGE from the future begins now.
-void Reader::stamp_arrival(const proto::RunView& view) {
-  const auto frame = proto::parse_frame({view.bytes, view.size}, proto::Origin::node);
+void Reader::stamp_arrival(const proto::RunView& view, proto::Origin origin) {
+  const auto frame = proto::parse_frame({view.bytes, view.size}, origin);
   if (!frame) return;
   const std::span<std::byte> extensions(const_cast<std::byte*>(frame->extensions.data()),
                                         frame->extensions.size());
@@ -241,6 +252,10 @@ void Reader::stamp_arrival(const proto::RunView& view) {
 bool Reader::handle_flow(Connection& connection, const proto::RunView& view) {
   const auto message =
       proto::flow::decode({view.bytes + proto::kHeaderSize, view.size - proto::kHeaderSize});
+  if (!message && connection.is_link()) {
+    state_.counters.malformed.add(1);
+    return true;
+  }
   if (!message) {
     return refuse(connection, proto::DropReason::malformed, proto::GoodbyeCode::malformed,
                   "malformed FLOW frame: unknown operation, or too short for it");

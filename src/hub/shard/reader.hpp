@@ -51,6 +51,11 @@ class Reader {
   [[nodiscard]] std::uint64_t share() const;
   /// False: the connection was closed.
   [[nodiscard]] bool process(Connection& connection, ReceiveBuffer::Received received);
+  /// The same of a link, whose frames are looked at run by run: each counts its hop.
+  [[nodiscard]] bool process_link(Connection& connection, ReceiveBuffer::Received received);
+  [[nodiscard]] bool process_runs(Connection& connection, ReceiveBuffer::Received received);
+  [[nodiscard]] bool take_begun(Connection& connection, std::span<const std::byte> begun,
+                                bool nothing_before, const proto::NextRun& found);
   /// Keeps the frame that was begun; where too much is kept, those go whose frames were begun
   /// before. False: nobody is left to go.
   [[nodiscard]] bool keep(Connection& connection, std::span<const std::byte> begun,
@@ -61,6 +66,11 @@ class Reader {
   [[nodiscard]] bool handle_run(Connection& connection, proto::NextRun& found);
   [[nodiscard]] bool handle_other(Connection& connection, const proto::RunView& view,
                                   Admission admission);
+  /// Frames of a link that are not routed. False: the connection was closed.
+  [[nodiscard]] bool handle_from_link(Connection& connection, const proto::RunView& view,
+                                      Admission admission);
+  void pass_on_flow(Connection& connection, const proto::RunView& view);
+  void drop_from_link(Connection& connection, const proto::RunView& view, proto::DropReason reason);
   void route(Connection& connection, const proto::NextRun& found);
   [[nodiscard]] bool handle_flow(Connection& connection, const proto::RunView& view);
   [[nodiscard]] bool handle_link(Connection& connection, const proto::RunView& view);
@@ -74,7 +84,7 @@ class Reader {
   /// Data frames that it sent, admitted.
   void count(Connection& connection, const proto::RunView& view);
   void count_taken(Connection& connection, const proto::RunView& view);
-  void stamp_arrival(const proto::RunView& view);
+  void stamp_arrival(const proto::RunView& view, proto::Origin origin);
   [[nodiscard]] bool refuse(Connection& connection, proto::DropReason reason,
                             proto::GoodbyeCode code, const std::string& sentence);
 

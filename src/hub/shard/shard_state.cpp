@@ -26,7 +26,8 @@ ShardState::ShardState(ShardIndex index, const HubShared& hub_shared)
              {hub_shared.nodes, hub_shared.groups}),
       pacer(fanout),
       retained(hub_shared.groups, fanout, pacer, hub_shared.retained_budget),
-      router(hub_shared.hub, {hub_shared.nodes, hub_shared.groups, fanout, pacer, retained}),
+      router(hub_shared.hub,
+             {hub_shared.nodes, hub_shared.groups, hub_shared.routes, fanout, pacer, retained}),
       receive_buffer(
           pool, tally,
           // Each shard keeps its part of all begun frames, and at least one: in a slab of its own.

@@ -33,6 +33,7 @@ struct HubShared {
   const Limits& limits;
   const NodeTable& nodes;
   const GroupTable& groups;
+  const RouteTable& routes;
   Quiescence& quiescence;
   Budget& budget;
   Budget& retained_budget;

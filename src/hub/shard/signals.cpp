@@ -2,6 +2,7 @@
 
 #include <cstring>
 
+#include "hub/shard/control_frame.hpp"
 #include "hub/shard/shard_state.hpp"
 
 namespace gimnet::hub {
@@ -28,7 +29,17 @@ void Signals::resume(NodeId sender, const proto::flow::Target& target) {
 void Signals::flow(NodeId sender, const proto::flow::Message& message) {
   std::byte frame[proto::flow::kFrameSizeMax];
   const std::size_t size = proto::flow::encode_frame(message, NodeId{}, frame);
+  // On the way to another hub it says for whom it is.
+  if (hub_of(sender) != state_.shared.hub) set_destination({frame, size}, sender);
   send_control(sender, {frame, size});
+}
+
+void Signals::pass_on(std::span<std::byte> frame) {
+  const proto::FrameHeader header = proto::load_header(frame.data());
+  const NodeId node{header.dst};
+  const bool here = hub_of(node) == state_.shared.hub;
+  if (here && header.kind == proto::Kind::flow) set_destination(frame, NodeId{});
+  send_control(node, frame);
 }
 
 void Signals::send_control(NodeId node, std::span<const std::byte> frame) {
@@ -50,14 +61,16 @@ void Signals::apply_control(NodeId node, std::span<const std::byte> frame) {
   if (connection->outbox.push_control(frame, state_.egress))
     return state_.recipients.mark_dirty(*connection);
   // PAUSE is told again, a REPORT may be missed; RESUME is said once.
-  if (is_resume(frame)) connection->missed_resume = true;
+  if (is_resume(frame) && !connection->is_link()) connection->missed_resume = true;
 }
 
 void Signals::hold(NodeId sender) { tell_hold(sender, true); }
 
 void Signals::release(NodeId sender) { tell_hold(sender, false); }
 
+/// A link is always read: a hub that refused to read one would stop everybody behind it.
 void Signals::tell_hold(NodeId sender, bool hold) {
+  if (hub_of(sender) != state_.shared.hub) return;
   const NodePlace place = state_.router.place_of(sender);
   if (!place.exists()) return;
   if (place.shard == state_.self) return apply_hold(sender, hold);

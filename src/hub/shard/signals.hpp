@@ -26,6 +26,8 @@ class Signals final : public SenderSignals {
   /// The same, and the holds, as another shard asked for them.
   void apply_control(NodeId node, std::span<const std::byte> frame);
   void apply_hold(NodeId node, bool hold);
+  /// A frame of another hub for a node: a REPORT, or a word about its sending.
+  void pass_on(std::span<std::byte> frame);
   /// REPORTs that are due.
   void send_reports();
 

@@ -55,6 +55,65 @@ namespace goodbye_key {
 enum : std::uint32_t { code = 1, sentence };
 }  // namespace goodbye_key
 
+/// In HELLO and in WELCOME.
+namespace introduction_key {
+enum : std::uint32_t {
+  hub = 20,
+  unique,
+  instance,
+  configured,
+  hub_name,
+  version,
+  link_name,
+  cost,
+  keep_alive_ms,
+  silent_ms,
+  features_required,
+};
+}  // namespace introduction_key
+
+void write_introduction(bitestream::Writer& writer, const HubIntroduction& said) {
+  namespace key = introduction_key;
+  writer.put_u16(key::hub, said.hub.hub.value());
+  writer.put_opaque(key::unique, std::as_bytes(std::span(said.hub.unique.bytes)));
+  writer.put_u64(key::instance, said.instance.value());
+  writer.put_bool(key::configured, said.configured);
+  put_clean_text(writer, key::hub_name, said.hub_name, kNameBytesMax);
+  put_clean_text(writer, key::version, said.version, kIntroducedVersionBytesMax);
+  put_clean_text(writer, key::link_name, said.link_name, kLinkNameBytesMax);
+  if (said.cost != 0) writer.put_u16(key::cost, said.cost);
+  writer.put_u32(key::keep_alive_ms, said.keep_alive_ms);
+  writer.put_u32(key::silent_ms, said.silent_ms);
+  if (said.features_required != 0) writer.put_u64(key::features_required, said.features_required);
+}
+
+std::optional<HubIntroduction> read_introduction(Fields& fields) {
+  namespace key = introduction_key;
+  if (!fields.has(key::hub)) return std::nullopt;
+  HubIntroduction said;
+  said.hub.hub = HubId{fields.number<std::uint16_t>(key::hub, "hub id", 0)};
+  if (said.hub.hub.value() == 0 || said.hub.hub.value() > kHubIdMax)
+    fields.fail("has a hub id outside 1..4094");
+  const auto unique = fields.opaque(key::unique, "unique id", said.hub.unique.bytes.size());
+  if (unique.size() == said.hub.unique.bytes.size()) {
+    std::ranges::transform(unique, said.hub.unique.bytes.begin(),
+                           [](std::byte each) { return std::to_integer<std::uint8_t>(each); });
+  } else {
+    fields.fail("has no unique id of 16 bytes");
+  }
+  said.instance = HubInstance{fields.required_number<std::uint64_t>(key::instance, "instance")};
+  said.configured = fields.flag(key::configured, "configured id", false);
+  said.hub_name = fields.text(key::hub_name, "hub name", kNameBytesMax);
+  said.version = fields.text(key::version, "version", kIntroducedVersionBytesMax);
+  said.link_name = fields.text(key::link_name, "link name", kLinkNameBytesMax);
+  said.cost = fields.number<std::uint16_t>(key::cost, "cost", 0);
+  said.keep_alive_ms = fields.number<std::uint32_t>(key::keep_alive_ms, "keep-alive interval", 0);
+  said.silent_ms = fields.number<std::uint32_t>(key::silent_ms, "silent time", 0);
+  said.features_required =
+      fields.number<std::uint64_t>(key::features_required, "required feature set", 0);
+  return said;
+}
+
 }  // namespace
 
 Opening check_opening(std::span<const std::byte> bytes) {
@@ -82,6 +141,7 @@ void Hello::write(bitestream::Writer& writer) const {
   if (resume_taken != 0) writer.put_u64(key::resume_taken, resume_taken);
   if (shard) writer.put_u16(key::shard, *shard);
   writer.put_u32(key::resume_buffer_bytes, resume_buffer_bytes);
+  if (introduction) write_introduction(writer, *introduction);
 }
 
 Hello Hello::read(Fields& fields) {
@@ -102,6 +162,7 @@ Hello Hello::read(Fields& fields) {
   if (fields.has(key::shard)) hello.shard = fields.number<std::uint16_t>(key::shard, "shard", 0);
   hello.resume_buffer_bytes =
       fields.number<std::uint32_t>(key::resume_buffer_bytes, "resume buffer", kResumeBufferDefault);
+  hello.introduction = read_introduction(fields);
   return hello;
 }
 
@@ -126,6 +187,7 @@ void Welcome::write(bitestream::Writer& writer) const {
   put_clean_text(writer, key::last_goodbye_sentence, last_goodbye_sentence, kSentenceBytesMax);
   put_clean_text(writer, key::name, name, kNameBytesMax);
   if (retained_bytes_max) writer.put_u32(key::retained_bytes_max, *retained_bytes_max);
+  if (introduction) write_introduction(writer, *introduction);
 }
 
 Welcome Welcome::read(Fields& fields) {
@@ -158,6 +220,7 @@ Welcome Welcome::read(Fields& fields) {
     welcome.retained_bytes_max =
         fields.number<std::uint32_t>(key::retained_bytes_max, "largest retained message", 0);
   }
+  welcome.introduction = read_introduction(fields);
   return welcome;
 }
 
@@ -166,7 +229,8 @@ const char* goodbye_name(GoodbyeCode code) {
       "done",          "bad_version",  "malformed",   "hello_timeout",     "name_taken",
       "bad_name",      "hub_full",     "draining",    "replaced",          "silent",
       "slow_consumer", "wrong_source", "not_allowed", "too_many_requests", "stalled_frame",
-      "kicked",        "no_memory",    "renumbered",  "oddities"};
+      "kicked",        "no_memory",    "renumbered",  "oddities",          "id_taken",
+      "copied"};
   const auto index = static_cast<std::size_t>(code);
   return index < kGoodbyeCount ? kNames[index] : "unknown";
 }

@@ -10,6 +10,7 @@
 
 #include "base/ids.hpp"
 #include "proto/control/control_message.hpp"
+#include "proto/control/hub_identity.hpp"
 #include "proto/frame/frame_header.hpp"
 
 // How a connection begins and ends: the opening bytes, HELLO, WELCOME and GOODBYE
@@ -38,6 +39,25 @@ enum class Opening : std::uint8_t {
 };
 [[nodiscard]] Opening check_opening(std::span<const std::byte> bytes);
 
+// A hub's words of itself, in HELLO and WELCOME of a link (docs/protocol.md, section 10)
+
+inline constexpr std::size_t kLinkNameBytesMax = 255;
+inline constexpr std::size_t kIntroducedVersionBytesMax = 64;
+
+struct HubIntroduction {
+  HubKey hub;
+  HubInstance instance;
+  bool configured = false;  ///< its hub id was configured, and not drawn
+  std::string hub_name;
+  std::string version;     ///< of its program, for people
+  std::string link_name;   ///< HELLO: what the dialler calls the link; 1..255 bytes
+  std::uint16_t cost = 0;  ///< HELLO: 1..65,535; 0: measured by the dialler
+  std::uint32_t keep_alive_ms = 0;
+  std::uint32_t silent_ms = 0;
+  std::uint64_t features_required = 0;
+  friend bool operator==(const HubIntroduction&, const HubIntroduction&) = default;
+};
+
 // HELLO
 
 enum class LinkOperation : std::uint16_t { hello = 1, welcome = 2, goodbye = 3 };
@@ -62,6 +82,7 @@ struct Hello {
   std::uint64_t resume_taken = 0;      ///< data frames of that epoch taken from the hub
   std::optional<std::uint16_t> shard;  ///< wished for
   std::uint32_t resume_buffer_bytes = kResumeBufferDefault;
+  std::optional<HubIntroduction> introduction;  ///< role hub
 
   void write(bitestream::Writer& writer) const;
   [[nodiscard]] static Hello read(Fields& fields);
@@ -75,7 +96,7 @@ struct Welcome {
   static constexpr const char* kName = "WELCOME";
 
   NodeId node;
-  std::vector<std::byte> token;  ///< 1..128 bytes
+  std::vector<std::byte> token;  ///< 1..128 bytes; a hub gets none
   HubId hub;
   std::string hub_name;
   std::uint64_t epoch = 0;  ///< the hub's, for this session
@@ -96,6 +117,7 @@ struct Welcome {
   /// Application data of the largest message of a retained service that the hub keeps; nothing: it
   /// does not tell.
   std::optional<std::uint32_t> retained_bytes_max;
+  std::optional<HubIntroduction> introduction;  ///< to a hub
 
   void write(bitestream::Writer& writer) const;
   [[nodiscard]] static Welcome read(Fields& fields);
@@ -124,9 +146,11 @@ enum class GoodbyeCode : std::uint16_t {
   no_memory = 16,
   renumbered = 17,
   oddities = 18,
+  id_taken = 19,
+  copied = 20,
 };
 /// How many codes there are; they are counted from 0 without a gap.
-inline constexpr std::size_t kGoodbyeCount = 19;
+inline constexpr std::size_t kGoodbyeCount = 21;
 /// The code as documents and tools print it, for example "name_taken".
 [[nodiscard]] const char* goodbye_name(GoodbyeCode code);
 

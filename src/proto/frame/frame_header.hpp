@@ -38,6 +38,8 @@ enum class Policy : std::uint8_t { kind_default = 0, block = 1, drop = 2, latest
 
 enum class Lane : std::uint8_t { real_time = 0, normal = 1, bulk = 2, background = 3 };
 inline constexpr std::size_t kLaneCount = 4;
+/// A frame crosses at most so many links: a chain of 32 hubs works.
+inline constexpr std::uint8_t kHopsMax = 31;
 
 inline constexpr std::uint8_t kFlagPolicyMask = 0x03;
 inline constexpr std::uint8_t kFlagReport = 0x04;
@@ -72,6 +74,7 @@ static_assert(sizeof(FrameHeader) == kHeaderSize);
 inline constexpr std::size_t kDstOffset = offsetof(FrameHeader, dst);
 inline constexpr std::size_t kSrcOffset = offsetof(FrameHeader, src);
 inline constexpr std::size_t kKindOffset = offsetof(FrameHeader, kind);
+inline constexpr std::size_t kHopsOffset = offsetof(FrameHeader, hops);
 inline constexpr std::size_t kLaneOffset = offsetof(FrameHeader, lane);
 /// 8 bytes: dst and src.
 inline constexpr std::size_t kAddressesOffset = kDstOffset;
@@ -125,16 +128,17 @@ enum class DropReason : std::uint8_t {
   malformed = 19,
   wrong_source = 20,
   not_retained = 21,
+  link_unsure = 22,  ///< it may have arrived
 };
-inline constexpr std::size_t kDropReasonCount = 22;
+inline constexpr std::size_t kDropReasonCount = 23;
 
 /// The reason's name as documents and tools print it, for example "queue_full".
 [[nodiscard]] constexpr const char* drop_reason_name(DropReason reason) {
   constexpr const char* kNames[kDropReasonCount] = {
-      "none",          "no_such_node",  "no_route",     "away",        "queue_full", "replaced",
-      "too_old",       "hop_limit",     "too_large",    "not_allowed", "wrong_way",  "link_lost",
-      "shard_full",    "no_such_group", "renumbered",   "over_budget", "timed_out",  "cut_message",
-      "no_subscriber", "malformed",     "wrong_source", "not_retained"};
+      "none",          "no_such_node",  "no_route",     "away",         "queue_full", "replaced",
+      "too_old",       "hop_limit",     "too_large",    "not_allowed",  "wrong_way",  "link_lost",
+      "shard_full",    "no_such_group", "renumbered",   "over_budget",  "timed_out",  "cut_message",
+      "no_subscriber", "malformed",     "wrong_source", "not_retained", "link_unsure"};
   const auto index = static_cast<std::size_t>(reason);
   return index < kDropReasonCount ? kNames[index] : "unknown";
 }

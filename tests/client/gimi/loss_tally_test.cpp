@@ -68,6 +68,7 @@ TEST(ReportedLoss, IsWhatTheWireSays) {
       {LossReason::no_subscriber, proto::DropReason::no_subscriber},
       {LossReason::malformed, proto::DropReason::malformed},
       {LossReason::wrong_source, proto::DropReason::wrong_source},
+      {LossReason::link_unsure, proto::DropReason::link_unsure},
   };
   EXPECT_EQ(std::size(pairs) + 2, proto::kDropReasonCount)
       << "and none, and not_retained, which is no loss";

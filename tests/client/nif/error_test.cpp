@@ -63,6 +63,7 @@ TEST(Error, DropReasonsAreThoseOfTheWire) {
       {NIF_DROP_MALFORMED, proto::DropReason::malformed},
       {NIF_DROP_WRONG_SOURCE, proto::DropReason::wrong_source},
       {NIF_DROP_NOT_RETAINED, proto::DropReason::not_retained},
+      {NIF_DROP_LINK_UNSURE, proto::DropReason::link_unsure},
   };
   EXPECT_EQ(std::size(pairs) + 1, proto::kDropReasonCount) << "and none";
   for (const auto& [known, wire] : pairs)

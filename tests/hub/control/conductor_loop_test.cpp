@@ -56,7 +56,9 @@ TEST(ConductorLoop, ANameThatWasGivenBackIsFreeHoweverMuchWasToldBefore) {
         inbox.push({shard, DrainedEvent{}});
     }
   };
-  ConductorLoop loop({hub.conductor, inbox, hub.limits, hub.refusals}, std::move(listeners));
+  LinkDialler dialler;
+  ConductorLoop loop({hub.conductor, inbox, hub.limits, hub.refusals, dialler},
+                     std::move(listeners));
   // Admitted, it is told nothing here: its shard would say WELCOME.
   std::thread refused([client] {
     std::byte answer[512];
@@ -101,7 +103,8 @@ TEST(ConductorLoop, ARequestWaitsForOneAnswerToEachOtherNode) {
         inbox.push({shard, DrainedEvent{}});
     }
   };
-  ConductorLoop loop({hub.conductor, inbox, hub.limits, hub.refusals}, {});
+  LinkDialler dialler;
+  ConductorLoop loop({hub.conductor, inbox, hub.limits, hub.refusals, dialler}, {});
   loop.run();
   set_log_level(LogLevel::info);
   EXPECT_EQ(answers, kBusy * kRequests + 1);

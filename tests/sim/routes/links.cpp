@@ -40,7 +40,7 @@ void World::dial(std::size_t wire) {
   if (!each.wanted || each.cut || each.ends[0].open || now() < each.dial_not_before) return;
   if (!takes_part(dialler) || !takes_part(acceptor)) return;
   const auto answer = hubs_[acceptor].state->admit(identity(dialler));
-  if (answer.admission != hub::Admission::accept) {
+  if (answer.admission != hub::LinkAdmission::accept) {
     refuse(wire, 1, answer);
     return;
   }
@@ -57,7 +57,7 @@ void World::welcome(std::size_t wire, std::uint64_t dialler_life, std::uint64_t 
   if (hubs_[dialler].life != dialler_life || hubs_[acceptor].life != acceptor_life) return;
   if (!takes_part(dialler) || !takes_part(acceptor)) return;
   const auto answer = hubs_[dialler].state->admit(identity(acceptor));
-  if (answer.admission != hub::Admission::accept) {
+  if (answer.admission != hub::LinkAdmission::accept) {
     refuse(wire, 0, answer);
     return;
   }
@@ -95,12 +95,12 @@ void World::close(std::size_t wire, int end, bool tell) {
   });
 }
 
-void World::refuse(std::size_t wire, int refusing, const hub::AdmissionAnswer& answer) {
+void World::refuse(std::size_t wire, int refusing, const hub::LinkAdmissionAnswer& answer) {
   Wire& each = wires_[wire];
   const std::size_t refuser = each.ends[static_cast<std::size_t>(refusing)].hub;
   const std::size_t refused = each.ends[static_cast<std::size_t>(1 - refusing)].hub;
   auto admission = answer.admission;
-  if (admission == hub::Admission::ask_old_link) {
+  if (admission == hub::LinkAdmission::ask_old_link) {
     census_.note(Event::asked_old_link);
     // PING over the old link: does the process at its other end answer?
     const std::size_t old = answer.old_link.value() - 1;
@@ -114,17 +114,17 @@ void World::refuse(std::size_t wire, int refusing, const hub::AdmissionAnswer& a
       });
       return;
     }
-    admission = hub::Admission::is_copy;
+    admission = hub::LinkAdmission::is_copy;
   }
   each.refusal = {admission, identity(refused), refuser, now()};
-  if (admission == hub::Admission::is_copy) {
+  if (admission == hub::LinkAdmission::is_copy) {
     last_copy_ = now();
     census_.note(Event::refused_copy);
     each.dial_not_before = now() + milliseconds(kRetryOfCopies);
-  } else if (admission == hub::Admission::draw_again) {
+  } else if (admission == hub::LinkAdmission::draw_again) {
     census_.note(Event::drew_again);
     leave(refuser, true, milliseconds(1));
-  } else if (admission == hub::Admission::id_taken) {
+  } else if (admission == hub::LinkAdmission::id_taken) {
     census_.note(Event::refused_id);
     if (!hubs_[refused].plan.configured) leave(refused, true, milliseconds(1));
   }

@@ -60,14 +60,14 @@ bool Settled::is_explained(const Wire& wire) const {
   }
   if (!wire.refusal) return false;
   const auto& [admission, refused, refusing, at] = *wire.refusal;
-  const bool copy = admission == hub::Admission::is_copy;
+  const bool copy = admission == hub::LinkAdmission::is_copy;
   if (at + (copy ? kRetriedAsCopy : kRetried) < world_.now()) return false;
   for (std::size_t hub = 0; hub < world_.hubs_.size(); ++hub) {
     if (component_[hub] != component_[refusing]) continue;
     const auto other = world_.identity(hub);
     if (other.instance == refused.instance) continue;
     if (copy && other.key.unique == refused.key.unique) return true;
-    if (admission != hub::Admission::id_taken || other.key.hub != refused.key.hub) continue;
+    if (admission != hub::LinkAdmission::id_taken || other.key.hub != refused.key.hub) continue;
     const bool preferred = other.configured != refused.configured
                                ? other.configured
                                : other.key.unique < refused.key.unique;
@@ -129,7 +129,7 @@ void Settled::find_shortest() {
 
 std::optional<std::pair<std::size_t, int>> Settled::follow(std::size_t from, HubId to) const {
   std::size_t at = from;
-  for (int hops = 0; hops <= 2 * hub::kHopsMax; ++hops) {
+  for (int hops = 0; hops <= 2 * proto::kHopsMax; ++hops) {
     const auto& state = *world_.hubs_[at].state;
     if (state.self().key.hub == to) return std::pair(at, hops);
     const auto link = state.map().next_hops()[to.value()];

@@ -63,7 +63,7 @@ struct Wire {
   std::uint64_t dead = 0;  ///< connections up to this one carry nothing any more
   milliseconds dial_not_before{0};
   struct Refusal {
-    hub::Admission admission;
+    hub::LinkAdmission admission;
     hub::HubIdentity refused;
     std::size_t refusing = 0;
     milliseconds at{0};
@@ -106,7 +106,7 @@ class World {
   void welcome(std::size_t wire, std::uint64_t dialler_life, std::uint64_t acceptor_life);
   void open(std::size_t wire, int end, std::uint64_t connection);
   void close(std::size_t wire, int end, bool tell);
-  void refuse(std::size_t wire, int refusing, const hub::AdmissionAnswer& answer);
+  void refuse(std::size_t wire, int refusing, const hub::LinkAdmissionAnswer& answer);
   void pass(std::size_t wire, int to, Message message);
   void arrive(std::size_t wire, int to, std::uint64_t connection, std::uint64_t life,
               const Message& message);

@@ -58,7 +58,7 @@ class Run {
       case 0: {
         const auto cost = static_cast<std::uint16_t>(choices_.byte() + 1);
         const auto peer = identity_of_choice(choices_);
-        if (hub_.admit(peer).admission != Admission::accept) break;
+        if (hub_.admit(peer).admission != LinkAdmission::accept) break;
         const auto before = peers_.find(link);
         if (before == peers_.end() || before->second != peer.instance) marked_.erase(link);
         peers_.insert_or_assign(link, peer.instance);

@@ -12,6 +12,7 @@
 #include "hub/control/state/membership.hpp"
 #include "hub/control/state/watches.hpp"
 #include "hub/limits.hpp"
+#include "hub/network/state/name_exchange.hpp"
 #include "hub/observe/counters.hpp"
 #include "hub/observe/refusal_counters.hpp"
 #include "hub/observe/request_counters.hpp"
@@ -48,6 +49,7 @@ struct HandlerContext {
   const RequestCounters* requests = nullptr;         ///< or none
   Administration* administration = nullptr;          ///< or none
   NetworkView* network = nullptr;                    ///< or none: a hub alone
+  const NameExchange* names = nullptr;               ///< with `network`
   std::optional<CountsBegin> counts{};               ///< what begins with the answer
 };
 

@@ -206,6 +206,8 @@ class Sessions {
   /// By ascending index.
   [[nodiscard]] const std::map<NodeIndex, Session>& all() const { return sessions_; }
   [[nodiscard]] std::size_t connected() const { return connected_; }
+  /// Places on the shards, of which links have some, too.
+  [[nodiscard]] SlotPool& slots() { return slots_; }
   [[nodiscard]] IndexPool& indices() { return indices_; }
   [[nodiscard]] const IndexPool& indices() const { return indices_; }
 

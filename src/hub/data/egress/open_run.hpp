@@ -45,9 +45,12 @@ struct OpenRun {
       return;
     }
     // The last piece may overlap the one before it: no byte beyond the frames is read or written.
-    std::uint32_t done = 0;
-    for (; done + kPiece < size; done += kPiece) std::memcpy(to + done, from + done, kPiece);
+    // Straight on: as a loop it costs a tenth of a small frame more.
+    std::memcpy(to, from, kPiece);
     std::memcpy(to + size - kPiece, from + size - kPiece, kPiece);
+    if (size <= 2 * kPiece) return;
+    std::memcpy(to + kPiece, from + kPiece, kPiece);
+    std::memcpy(to + size - 2 * kPiece, from + size - 2 * kPiece, kPiece);
   }
   static constexpr std::uint32_t kPiece = 16;
   static constexpr std::uint32_t kInlineBytesMax = 64;

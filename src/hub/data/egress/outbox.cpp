@@ -171,10 +171,10 @@ void Outbox::open_run(LaneQueue& lane, const Limits& limits, std::size_t lane_in
                   &last};
 }
 
-bool Outbox::push_control(std::span<const std::byte> frame, EgressContext& context) {
+bool Outbox::push_control(std::span<const std::byte> frame, EgressContext& context,
+                          std::uint64_t bytes_most) {
   context.owner.check_here();
-  if (control_bytes_ - first_control_bytes() + frame.size() > context.limits.control_bytes)
-    return false;
+  if (control_bytes_ - first_control_bytes() + frame.size() > bytes_most) return false;
   put_control(frame, context);
   return true;
 }

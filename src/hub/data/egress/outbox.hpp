@@ -37,7 +37,8 @@ class Outbox {
   /// The usual case of small messages, made short: frames like those that came last are copied
   /// right behind them. False: nothing was done, push() them. REQUIRES: as push(), of which one was
   /// made in this turn. The caller counts them as queued and copied.
-  [[nodiscard]] bool append(const std::byte* frames, std::uint32_t size, std::uint32_t count) {
+  [[nodiscard, gnu::always_inline]] bool append(const std::byte* frames, std::uint32_t size,
+                                                std::uint32_t count) {
     if (!lanes_ || !lanes_->open.takes(frames, size) || size >= kAppendBytesMax) return false;
     lanes_->open.append(frames, size, count);
     chunk_used_ += size;
@@ -59,7 +60,12 @@ class Outbox {
 
   /// A frame of FLOW, LINK, NS or CTRL: goes before all lanes. Returns false if too much of that
   /// waits: the peer asks and does not listen.
-  [[nodiscard]] bool push_control(std::span<const std::byte> frame, EgressContext& context);
+  [[nodiscard]] bool push_control(std::span<const std::byte> frame, EgressContext& context) {
+    return push_control(frame, context, context.limits.control_bytes);
+  }
+  /// The same with another limit on what waits.
+  [[nodiscard]] bool push_control(std::span<const std::byte> frame, EgressContext& context,
+                                  std::uint64_t bytes_most);
   /// What a new connection is to get ahead of all else, whatever its size: frames as push_control()
   /// takes them. They do not count against the limit on those, or a peer that came back to much
   /// could ask for nothing.

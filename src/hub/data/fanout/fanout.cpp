@@ -192,6 +192,14 @@ Run Fanout::copy_without_ids(const Run& frame, const proto::FrameHeader& header)
   return Run{lists_.share(), place, size, 1};
 }
 
+std::byte* Fanout::write_ids(std::byte* to, std::span<const NodeId> ids) {
+  for (const NodeId id : ids) {
+    store_le(to, id.value());
+    to += kNodeIdBytes;
+  }
+  return to;
+}
+
 Run Fanout::copy_for(std::span<const NodeId> ids, const Run& frame,
                      const proto::FrameHeader& header) {
   const std::uint32_t offset = list_frame_offset(static_cast<std::uint32_t>(ids.size()));
@@ -201,12 +209,19 @@ Run Fanout::copy_for(std::span<const NodeId> ids, const Run& frame,
   outer.dst = static_cast<std::uint32_t>(ids.size());
   outer.length = size - static_cast<std::uint32_t>(proto::kHeaderSize);
   proto::store_header(place, outer);
-  std::byte* at = place + proto::kHeaderSize;
-  for (const NodeId id : ids) {
-    store_le(at, id.value());
-    at += kNodeIdBytes;
-  }
-  write_without_ids(at, frame, header);
+  write_without_ids(write_ids(place + proto::kHeaderSize, ids), frame, header);
+  return Run{lists_.share(), place, size, 1};
+}
+
+Run Fanout::copy_with_ids(std::span<const NodeId> ids, const Run& frame,
+                          const proto::FrameHeader& header) {
+  const auto size = static_cast<std::uint32_t>(header.frame_size());
+  std::byte* const place = list_room(size);
+  proto::store_header(place, header);
+  std::byte* const rest = write_ids(place + proto::kHeaderSize, ids);
+  const std::uint32_t rest_bytes = frame.size - static_cast<std::uint32_t>(proto::kHeaderSize);
+  std::memcpy(rest, frame.bytes + proto::kHeaderSize, rest_bytes);
+  context_.tally.copied_bytes += rest_bytes;
   return Run{lists_.share(), place, size, 1};
 }
 

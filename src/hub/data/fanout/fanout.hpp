@@ -39,6 +39,10 @@ class Fanout {
   /// A LIST frame as its recipients get it: `header`, and the last header.length bytes of the
   /// frame. One copy for all recipients on this shard.
   [[nodiscard]] Run copy_without_ids(const Run& frame, const proto::FrameHeader& header);
+  /// Such a copy with the ids in it again, as a link gets it: `header`, the ids, and the frame's
+  /// bytes behind its header.
+  [[nodiscard]] Run copy_with_ids(std::span<const NodeId> ids, const Run& frame,
+                                  const proto::FrameHeader& header);
   /// The same for another shard: a LIST frame with the ids of its nodes, and behind them such a
   /// copy.
   [[nodiscard]] Run copy_for(std::span<const NodeId> ids, const Run& frame,
@@ -84,6 +88,8 @@ class Fanout {
             Handover handover);
   /// Memory for a LIST frame.
   [[nodiscard]] std::byte* list_room(std::uint32_t bytes);
+  /// Returns the place behind them.
+  [[nodiscard]] static std::byte* write_ids(std::byte* to, std::span<const NodeId> ids);
   /// `to`: as many bytes as the header says.
   void write_without_ids(std::byte* to, const Run& frame, const proto::FrameHeader& header);
   [[nodiscard]] bool gather(Stretch& stretch, const Run& run);

@@ -11,10 +11,10 @@
 
 namespace gimnet::hub {
 
-/// A session as the data plane sees it: somebody on this shard to whom frames go. Thread safety:
-/// one shard.
+/// A session as the data plane sees it: a node or a link on this shard, to which frames go. Thread
+/// safety: one shard.
 struct Recipient {
-  NodeId node;
+  NodeId node;  ///< of a link: the hub at its other end, `hub << 20`
   ConnectionSlot slot;
   std::uint32_t generation = 0;
   std::uint32_t frame_bytes = proto::kFrameLengthDefault;  ///< largest `length` that it takes
@@ -23,6 +23,8 @@ struct Recipient {
   bool connected = false;
   bool waits_when_away = false;  ///< asked for resume: frames wait during its grace time
   bool dirty = false;            ///< is in the list of those to be flushed
+
+  [[nodiscard]] bool is_link() const { return index_of(node) == kHubIndex; }
 };
 
 /// The sessions of a shard by slot, and those that this turn has something to write for. Thread

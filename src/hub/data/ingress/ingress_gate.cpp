@@ -1,5 +1,6 @@
 #include "hub/data/ingress/ingress_gate.hpp"
 
+#include <algorithm>
 #include <memory>
 
 namespace gimnet::hub {
@@ -38,6 +39,7 @@ void keep_frames_with_key(proto::RunView& view) {
 
 Admission IngressGate::look_at(IngressState& state, std::byte* run, proto::RunView& view,
                                std::uint64_t now_ms) {
+  if (state.link != nullptr) return look_at_link(state, run, view);
   const proto::FrameHeader header = proto::load_header(view.bytes);
   const auto attributes = load_le<std::uint32_t>(view.bytes + proto::kAttributesOffset);
   if (attributes != state.admitted_attributes || header.src != state.node.value()) {
@@ -62,12 +64,48 @@ Admission IngressGate::check(IngressState& state, const proto::FrameHeader& head
   if (static_cast<std::uint8_t>(header.kind) >= proto::kFirstControlKind)
     return check_request(state, header, view);
   if (header.kind == proto::Kind::flow) return Admission::flow;
+  return check_parts(state, header, view, proto::Origin::node);
+}
+
+Admission IngressGate::check_parts(IngressState& state, const proto::FrameHeader& header,
+                                   proto::RunView& view, proto::Origin origin) {
   if (proto::may_form_run(header)) {
     if (header.has(proto::kFlagKeyed)) keep_frames_with_key(view);
     return view.frames != 0 ? Admission::data : refuse(state, proto::FrameError::key_too_short);
   }
-  const auto frame = proto::parse_frame({view.bytes, view.size}, proto::Origin::node);
+  const auto frame = proto::parse_frame({view.bytes, view.size}, origin);
   return frame ? Admission::data : refuse(state, frame.error());
+}
+
+bool LinkRule::allows(HubId source) const {
+  if (source == own || source == kOwnHub || source.value() > kHubIdMax) return false;
+  return allow.empty() || std::ranges::binary_search(allow, source);
+}
+
+/// The rules for a node hold, but for hops, source and the kinds that hubs alone send.
+Admission IngressGate::look_at_link(IngressState& state, std::byte* run, proto::RunView& view) {
+  proto::FrameHeader header = proto::load_header(view.bytes);
+  if (header.kind == proto::Kind::link) return Admission::link;
+  if (header.kind == proto::Kind::route) return Admission::control;
+  const std::uint8_t hops = std::exchange(header.hops, 0);
+  if (header.kind == proto::Kind::flow) return Admission::flow;
+  const bool report = header.kind == proto::Kind::report;
+  if (!report) {
+    const proto::FrameError error = proto::check_header_from_node(header);
+    if (error != proto::FrameError::none) return refuse(state, error);
+  }
+  if (!state.link->allows(hub_of(NodeId{header.src}))) return Admission::wrong_source;
+  if (report) return Admission::report;
+  if (static_cast<std::uint8_t>(header.kind) >= proto::kFirstControlKind) return Admission::control;
+  if (const Admission parts = check_parts(state, header, view, proto::Origin::hub);
+      parts != Admission::data)
+    return parts;
+  if (hops >= proto::kHopsMax) return Admission::hop_limit;
+  for (std::uint32_t done = 0; done < view.size;) {
+    run[done + proto::kHopsOffset] = static_cast<std::byte>(hops + 1);
+    done += static_cast<std::uint32_t>(proto::load_header(run + done).frame_size());
+  }
+  return Admission::data;
 }
 
 Admission IngressGate::check_request(IngressState& state, const proto::FrameHeader& header,

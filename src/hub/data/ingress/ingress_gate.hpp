@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "base/endian.hpp"
 #include "base/ids.hpp"
@@ -19,8 +20,17 @@ enum class Admission : std::uint8_t {
   flow,          ///< FLOW, for this connection
   link,          ///< LINK, for this connection
   control,       ///< NS or CTRL, for the conductor
-  malformed,     ///< breaks docs/protocol.md, section 2: close
-  wrong_source,  ///< speaks for somebody else: close
+  malformed,     ///< breaks docs/protocol.md, section 2: close a node, drop a link's frame
+  wrong_source,  ///< speaks for somebody else: close a node, drop a link's frame
+  hop_limit,     ///< of a link: crossed as many links as it may; drop
+  report,        ///< of a link: REPORT, for the node that it names
+};
+
+/// The frames that a link may carry. Immutable.
+struct LinkRule {
+  HubId own;                   ///< this hub, for which nobody else speaks
+  std::vector<HubId> allow{};  ///< sources' hubs, ascending; empty: all
+  [[nodiscard]] bool allows(HubId source) const;
 };
 
 /// What the gate remembers of one connection. Thread safety: one shard.
@@ -29,6 +39,7 @@ struct IngressState {
   static constexpr std::uint32_t kPlainUnicast = 1u << 24;
 
   NodeId node;
+  const LinkRule* link = nullptr;  ///< nullptr: a node
   /// Kind, flags, hops and lane of the last legal run of plain data.
   std::uint32_t admitted_attributes = kPlainUnicast;
   std::uint64_t lane0_bytes = 0;  ///< since lane0_since_ms
@@ -64,6 +75,11 @@ class IngressGate {
  private:
   [[nodiscard]] Admission look_at(IngressState& state, std::byte* run, proto::RunView& view,
                                   std::uint64_t now_ms);
+  /// Counts the hop in each frame that goes on.
+  [[nodiscard]] static Admission look_at_link(IngressState& state, std::byte* run,
+                                              proto::RunView& view);
+  [[nodiscard]] static Admission check_parts(IngressState& state, const proto::FrameHeader& header,
+                                             proto::RunView& view, proto::Origin origin);
   [[nodiscard]] Admission check(IngressState& state, const proto::FrameHeader& header,
                                 proto::RunView& view);
   [[nodiscard]] static Admission check_request(IngressState& state,

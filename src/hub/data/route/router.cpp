@@ -1,5 +1,6 @@
 #include "hub/data/route/router.hpp"
 
+#include <algorithm>
 #include <bit>
 
 #include "proto/frame/frame_parser.hpp"
@@ -27,7 +28,7 @@ void Router::settle(const Run& run, std::uint32_t outcomes) {
 }
 
 NodePlace Router::place_of(NodeId node) const {
-  return hub_of(node) == hub_ ? nodes_.find(index_of(node)) : NodePlace{};
+  return hub_of(node) == hub_ ? nodes_.find(index_of(node)) : routes_.find(hub_of(node)).link;
 }
 
 void Router::dispatch(const Run& run, const proto::FrameHeader& header, Arrival arrival) {
@@ -86,13 +87,22 @@ inline Recipient* Router::find_here(const Run& run, const NodePlace& place, Arri
 
 void Router::to_node(const Run& run, const proto::FrameHeader& header, NodeId node,
                      Arrival arrival) {
-  if (hub_of(node) != hub_) return drop(run, proto::DropReason::no_route);
+  if (hub_of(node) != hub_) return to_hub(run, header, hub_of(node), arrival);
   const NodePlace place = nodes_.find(index_of(node));
   if (!place.exists()) return drop(run, why_absent(node));
   Recipient* recipient = find_here(run, place, arrival);
   if (recipient == nullptr) return;
   flows_.note(*recipient, run.bytes);
   fanout_.deliver(*recipient, run, header, Handover{});
+}
+
+/// The neighbour hub counts, not the link: a frame that came from it never goes back to it, which
+/// ends all loops of two hubs.
+void Router::to_hub(const Run& run, const proto::FrameHeader& header, HubId hub, Arrival arrival) {
+  const NextHop next = routes_.find(hub);
+  if (!next.exists() || next.neighbour == from_) return drop(run, proto::DropReason::no_route);
+  Recipient* recipient = find_here(run, next.link, arrival);
+  if (recipient != nullptr) fanout_.deliver(*recipient, run, header, Handover{});
 }
 
 proto::DropReason Router::why_absent(NodeId node) const {
@@ -187,6 +197,8 @@ void Router::to_other_shards(const Run& run, std::uint64_t shards, std::size_t d
 }
 
 void Router::to_provider(const Run& run, const proto::FrameHeader& header, Arrival arrival) {
+  const HubId owner = hub_of(GroupId{header.dst});
+  if (owner != hub_) return to_hub(run, header, owner, arrival);
   const GroupMembers* members = find_group(run, header);
   if (members == nullptr) return;
   if (!members->provided()) return drop(run, proto::DropReason::no_such_group);
@@ -207,13 +219,16 @@ void Router::to_list(const Run& run, const proto::FrameHeader& header) {
     if (here.frames == 0) here = fanout_.copy_without_ids(run, without_ids);
   };
   std::uint64_t shards = 0;
-  std::uint32_t foreign = 0;
   std::uint32_t outcomes = 0;
   deliveries_ += ids.size();
   for (std::uint32_t i = 0; i < ids.size(); ++i) {
     const NodeId node = ids[i];
     if (hub_of(node) != hub_) {
-      ++foreign;
+      if (!list_behind(node)) {
+        copy_here();
+        drop(here, proto::DropReason::no_route);
+        ++outcomes;
+      }
       continue;
     }
     const NodePlace place = nodes_.find(index_of(node));
@@ -226,10 +241,16 @@ void Router::to_list(const Run& run, const proto::FrameHeader& header) {
     to_listed(here, without_ids, node, place);
     ++outcomes;
   }
-  if (foreign != 0) {
+  for (Behind& behind : behind_) {
+    if (behind.ids.empty()) continue;
     copy_here();
-    fanout_.context().drops.drop(here.bytes, foreign, proto::DropReason::no_route);
-    outcomes += foreign;
+    if (behind.link.shard == fanout_.self()) {
+      to_listed_behind(here, without_ids, behind.ids, behind.link);
+    } else {
+      fanout_.hand_over(behind.link.shard, fanout_.copy_for(behind.ids, run, without_ids), 1);
+    }
+    behind.ids.clear();
+    ++outcomes;
   }
   for (; shards != 0; shards &= shards - 1, ++outcomes) {
     const ShardIndex shard{static_cast<std::uint8_t>(std::countr_zero(shards))};
@@ -246,10 +267,41 @@ void Router::to_listed_here(const Run& run, const proto::FrameHeader& header) {
   Run frame = run.share();
   static_cast<void>(frame.take_front({0, list_frame_offset(ids.size())}));
   const proto::FrameHeader without_ids = frame.header();
+  if (const HubId hub = hub_of(ids[0]); hub != hub_) {
+    std::vector<NodeId>& behind = listed_[fanout_.self().value()];
+    for (std::uint32_t i = 0; i < ids.size(); ++i) behind.push_back(ids[i]);
+    to_listed_behind(frame, without_ids, behind, routes_.find(hub).link);
+    behind.clear();
+    return;
+  }
   deliveries_ += ids.size();
   for (std::uint32_t i = 0; i < ids.size(); ++i)
     to_listed(frame, without_ids, ids[i], place_of(ids[i]));
   settle(run, ids.size());
+}
+
+/// Puts the node with those behind the same link. False: there is no route to it.
+bool Router::list_behind(NodeId node) {
+  const NextHop next = routes_.find(hub_of(node));
+  if (!next.exists() || next.neighbour == from_) return false;
+  const auto known = std::ranges::find_if(
+      behind_, [&](const Behind& each) { return each.ids.empty() || each.link == next.link; });
+  Behind& behind = known != behind_.end() ? *known : behind_.emplace_back();
+  behind.link = next.link;
+  behind.ids.push_back(node);
+  return true;
+}
+
+/// One LIST frame for all of them, with their ids.
+void Router::to_listed_behind(const Run& frame, const proto::FrameHeader& header,
+                              std::span<const NodeId> ids, const NodePlace& link) {
+  const bool here = link.exists() && link.shard == fanout_.self();
+  Recipient* recipient = here ? fanout_.recipients().find(link.slot, link.generation) : nullptr;
+  if (recipient == nullptr) return drop(frame, proto::DropReason::no_route);
+  proto::FrameHeader listed = header;
+  listed.dst = static_cast<std::uint32_t>(ids.size());
+  listed.length += kNodeIdBytes * listed.dst;
+  fanout_.deliver(*recipient, fanout_.copy_with_ids(ids, frame, listed), listed, Handover{});
 }
 
 /// To one recipient of a LIST frame, here or nowhere.
@@ -272,7 +324,8 @@ void Router::to_everybody(const Run& run, const proto::FrameHeader& header, Arri
   deliveries_ += slots;
   const Handover handover{.fan_out = true};
   for (Recipient* recipient : fanout_.recipients().by_slot()) {
-    if (recipient == nullptr || recipient->node == NodeId{header.src}) continue;
+    if (recipient == nullptr || recipient->is_link() || recipient->node == NodeId{header.src})
+      continue;
     fanout_.deliver(*recipient, run, header, handover);
     ++outcomes;
   }

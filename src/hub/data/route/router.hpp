@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "base/ids.hpp"
@@ -10,6 +11,7 @@
 #include "hub/data/route/flow_cache.hpp"
 #include "hub/data/tables/group_table.hpp"
 #include "hub/data/tables/node_table.hpp"
+#include "hub/data/tables/route_table.hpp"
 #include "proto/frame/frame_header.hpp"
 
 namespace gimnet::hub {
@@ -21,6 +23,7 @@ class Router {
   struct Parts {
     const NodeTable& nodes;
     const GroupTable& groups;
+    const RouteTable& routes;
     Fanout& fanout;
     Pacer& pacer;
     RetainedMessages& retained;
@@ -29,6 +32,7 @@ class Router {
       : hub_(hub),
         nodes_(parts.nodes),
         groups_(parts.groups),
+        routes_(parts.routes),
         fanout_(parts.fanout),
         pacer_(parts.pacer),
         retained_(parts.retained),
@@ -39,6 +43,8 @@ class Router {
   /// Bytes of `source`'s connection are looked at from here on, or those that other shards handed
   /// over (0).
   void begin_bytes(NodeId source) { flows_.begin(source, nodes_.epoch()); }
+  /// The bytes that are looked at came over a link from that hub; 0: not any more.
+  void set_neighbour(HubId from) { from_ = from; }
   /// The usual case of small messages, made short: frames from `begin` on that are like those
   /// before them, to different nodes in turns. Returns what was done. REQUIRES: begin <= end;
   /// begin_bytes() was called for them.
@@ -63,7 +69,7 @@ class Router {
   /// the start; a run counts as one frame. Frames to one are bounded by what is read.
   [[nodiscard]] std::uint64_t deliveries() const { return deliveries_; }
 
-  /// A frame that the hub itself made, to a node on whatever shard (a REPORT).
+  /// A frame that the hub itself made, to a node on whatever shard or behind a link (a REPORT).
   [[nodiscard]] NodePlace place_of(NodeId node) const;
 
  private:
@@ -93,6 +99,7 @@ class Router {
   }
   void dispatch(const Run& run, const proto::FrameHeader& header, Arrival arrival);
   void to_node(const Run& run, const proto::FrameHeader& header, NodeId node, Arrival arrival);
+  void to_hub(const Run& run, const proto::FrameHeader& header, HubId hub, Arrival arrival);
   /// nullptr: it is not here. The run was handed over or dropped then.
   [[nodiscard]] Recipient* find_here(const Run& run, const NodePlace& place, Arrival arrival);
   void to_group(const Run& run, const proto::FrameHeader& header, Arrival arrival);
@@ -101,6 +108,9 @@ class Router {
   void to_provider(const Run& run, const proto::FrameHeader& header, Arrival arrival);
   void to_list(const Run& run, const proto::FrameHeader& header);
   void to_listed_here(const Run& run, const proto::FrameHeader& header);
+  [[nodiscard]] bool list_behind(NodeId node);
+  void to_listed_behind(const Run& frame, const proto::FrameHeader& header,
+                        std::span<const NodeId> ids, const NodePlace& link);
   void to_listed(const Run& frame, const proto::FrameHeader& header, NodeId node,
                  const NodePlace& place);
   void to_everybody(const Run& run, const proto::FrameHeader& header, Arrival arrival);
@@ -117,10 +127,18 @@ class Router {
   const HubId hub_;
   const NodeTable& nodes_;
   const GroupTable& groups_;
+  const RouteTable& routes_;
   Fanout& fanout_;
   Pacer& pacer_;
   RetainedMessages& retained_;
   FlowCache flows_;
+  HubId from_;  ///< at the other end of the link that is read; 0: none is
+  /// Nodes of the present LIST that one link leads to.
+  struct Behind {
+    NodePlace link;
+    std::vector<NodeId> ids;  ///< none: the place is free
+  };
+  std::vector<Behind> behind_;
   std::vector<std::vector<NodeId>> listed_;  ///< of the present LIST, by shard; else empty
   std::uint64_t deliveries_ = 0;
 };

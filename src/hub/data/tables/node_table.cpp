@@ -30,11 +30,7 @@ void NodeTable::publish(std::uint32_t index, NodePlace place) {
                place.shard.value() < kShardsMax);
   if (may_return(index)) change_expected(index, false);  // it came, and may leave for good
   const NodePlace before = find(index);
-  const std::uint64_t word = place.exists()
-                                 ? (static_cast<std::uint64_t>(place.generation) << 32) |
-                                       (static_cast<std::uint64_t>(place.shard.value()) << 24) |
-                                       place.slot.value()
-                                 : place.slot.value();
+  const std::uint64_t word = place.exists() ? pack(place) : place.slot.value();
   words_[index].store(word, std::memory_order_release);  // pairs with the acquire load in find()
   epoch_.fetch_add(1, std::memory_order_release);        // pairs with the acquire load in epoch()
   std::uint64_t shards = shards_.load(std::memory_order_relaxed);  // relaxed: this thread wrote it

@@ -28,6 +28,16 @@ inline constexpr std::uint32_t kSlotsMax = 1u << 24;
 /// The most shards that a hub can have: as many as bits in a set of them.
 inline constexpr std::size_t kShardsMax = 64;
 
+[[nodiscard]] constexpr std::uint64_t pack(const NodePlace& place) {
+  return (static_cast<std::uint64_t>(place.generation) << 32) |
+         (static_cast<std::uint64_t>(place.shard.value()) << 24) | place.slot.value();
+}
+[[nodiscard]] constexpr NodePlace unpack(std::uint64_t word) {
+  return NodePlace{ShardIndex{static_cast<std::uint8_t>(word >> 24)},
+                   ConnectionSlot{static_cast<std::uint32_t>(word & (kSlotsMax - 1))},
+                   static_cast<std::uint32_t>(word >> 32)};
+}
+
 /// Node index to place, for the nodes of this hub: a flat array of 2^20 words, and a bit for each,
 /// in memory that the kernel hands out page by page. Thread safety: one writer (the conductor), any
 /// number of readers; reads are wait-free.
@@ -73,12 +83,6 @@ class NodeTable {
   }
 
  private:
-  static NodePlace unpack(std::uint64_t word) {
-    return NodePlace{ShardIndex{static_cast<std::uint8_t>(word >> 24)},
-                     ConnectionSlot{static_cast<std::uint32_t>(word & (kSlotsMax - 1))},
-                     static_cast<std::uint32_t>(word >> 32)};
-  }
-
   /// Returns how many there are now.
   std::uint32_t change_count(ShardIndex shard, int change);
   void change_expected(std::uint32_t index, bool expected);

@@ -132,7 +132,7 @@ NetworkMap::NetworkMap(const HubIdentity& self, const RecordStore& store,
     if (label.neighbour == kNobody) continue;  // this hub itself
     Way way{graph.hubs()[at], neighbours[label.neighbour].link, label.cost,
             static_cast<std::uint16_t>(label.hops)};
-    if (way.hops > kHopsMax) way.link = LinkNumber{};
+    if (way.hops > proto::kHopsMax) way.link = LinkNumber{};
     ways.push_back(way);
   }
   keep_preferred(self, store, ways);

@@ -10,14 +10,12 @@
 #include "base/ids.hpp"
 #include "hub/network/state/own_record.hpp"
 #include "hub/network/state/record_store.hpp"
+#include "proto/frame/frame_header.hpp"
 
 namespace gimnet::hub {
 
 /// A link among those of this hub, as the owner of the network's state numbers them. 0: none.
 using LinkNumber = StrongId<struct LinkNumberTag, std::uint32_t>;
-
-/// A frame crosses at most so many links: a chain of 32 hubs works.
-inline constexpr std::uint16_t kHopsMax = 31;
 
 /// A neighbour of this hub, and the link to it that carries.
 struct CarryingLink {

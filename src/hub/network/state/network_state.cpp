@@ -15,27 +15,27 @@ constexpr std::uint16_t kDrawnFrom = 1024;
 NetworkState::NetworkState(HubIdentity self, HubWords words)
     : own_(self, std::move(words)), map_(self) {}
 
-AdmissionAnswer NetworkState::admit(const HubIdentity& newcomer) const {
+LinkAdmissionAnswer NetworkState::admit(const HubIdentity& newcomer) const {
   const HubIdentity& self = own_.identity();
-  if (newcomer.instance == self.instance) return {Admission::is_self};
-  if (newcomer.key.unique == self.key.unique) return {Admission::is_copy, self.key};
+  if (newcomer.instance == self.instance) return {LinkAdmission::is_self};
+  if (newcomer.key.unique == self.key.unique) return {LinkAdmission::is_copy, self.key};
   for (const auto& [number, link] : links_) {
     const HubIdentity& peer = link.facts.peer;
     if (peer.key.unique == newcomer.key.unique && peer.instance != newcomer.instance)
-      return {Admission::ask_old_link, peer.key, number};
+      return {LinkAdmission::ask_old_link, peer.key, number};
   }
   if (newcomer.key.hub == self.key.hub) {
-    if (!self.configured && is_preferred(newcomer, self)) return {Admission::draw_again};
-    return {Admission::id_taken, self.key};
+    if (!self.configured && is_preferred(newcomer, self)) return {LinkAdmission::draw_again};
+    return {LinkAdmission::id_taken, self.key};
   }
   for (const proto::HubKey& hub : map_.reachable()) {
     if (hub == self.key) continue;
     const auto known = identity_of(*store_.find(hub));
     if (!known) continue;
     if (hub.unique == newcomer.key.unique) {
-      if (known->instance != newcomer.instance) return {Admission::is_copy, hub};
+      if (known->instance != newcomer.instance) return {LinkAdmission::is_copy, hub};
     } else if (hub.hub == newcomer.key.hub && is_preferred(*known, newcomer)) {
-      return {Admission::id_taken, hub};
+      return {LinkAdmission::id_taken, hub};
     }
   }
   return {};
@@ -134,12 +134,14 @@ void NetworkState::leave() {
   sendings_.clear();
   own_.forget_copy();
   map_ = NetworkMap(own_.identity());
+  ++maps_;
 }
 
 void NetworkState::renumber(HubId hub) {
   GIMNET_CHECK(links_.empty());
   own_.renumber(hub);
   map_ = NetworkMap(own_.identity());
+  ++maps_;
   map_changed_ = true;
 }
 
@@ -186,6 +188,7 @@ void NetworkState::compute_map(std::chrono::milliseconds now) {
   map_changed_ = false;
   map_pace_.note_done(now);
   map_ = NetworkMap(own_.identity(), store_, carrying_links());
+  ++maps_;
   store_.set_reachable(map_.reachable(), now);
 }
 

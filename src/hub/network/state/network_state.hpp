@@ -25,7 +25,7 @@ struct LinkFacts {
 };
 
 /// Whether a hub may become a neighbour, from the view of either end of a new link.
-enum class Admission : std::uint8_t {
+enum class LinkAdmission : std::uint8_t {
   accept,
   is_self,       ///< this process dialled itself
   is_copy,       ///< its state folder is a copy of one that another hub uses, perhaps this one
@@ -33,8 +33,8 @@ enum class Admission : std::uint8_t {
   id_taken,      ///< another hub keeps its hub id
   draw_again,    ///< it keeps this hub's id: this hub draws another one, then it may try again
 };
-struct AdmissionAnswer {
-  Admission admission = Admission::accept;
+struct LinkAdmissionAnswer {
+  LinkAdmission admission = LinkAdmission::accept;
   std::optional<proto::HubKey> holder{};  ///< id_taken, is_copy: the hub that is known
   LinkNumber old_link{};                  ///< ask_old_link
 };
@@ -70,7 +70,7 @@ class NetworkState {
 
   NetworkState(HubIdentity self, HubWords words);
 
-  [[nodiscard]] AdmissionAnswer admit(const HubIdentity& newcomer) const;
+  [[nodiscard]] LinkAdmissionAnswer admit(const HubIdentity& newcomer) const;
 
   /// A connection of a link begins: the first one, or the next one after a break. All records go
   /// to it, then the mark that ends them. The link counts once the mark of the other side has come;
@@ -85,6 +85,11 @@ class NetworkState {
   /// A damped link carries records and is not reported.
   void set_damped(LinkNumber number, bool damped);
   void end_link(LinkNumber number);
+  /// All records of the other side have come.
+  [[nodiscard]] bool is_up(LinkNumber number) const {
+    const auto found = links_.find(number);
+    return found != links_.end() && found->second.has_mark;
+  }
   /// Ends all links: after a verdict.
   void leave();
   /// Takes another hub id. REQUIRES: no link.
@@ -99,6 +104,8 @@ class NetworkState {
 
   [[nodiscard]] const HubIdentity& self() const { return own_.identity(); }
   [[nodiscard]] const NetworkMap& map() const { return map_; }
+  /// Counts the maps: another number is another map.
+  [[nodiscard]] std::uint64_t maps() const { return maps_; }
   [[nodiscard]] const RecordStore& store() const { return store_; }
   [[nodiscard]] std::uint64_t digest() const { return store_.digest(); }
   [[nodiscard]] Verdict verdict() const;
@@ -126,6 +133,7 @@ class NetworkState {
   OwnRecord own_;
   RecordStore store_;
   NetworkMap map_;
+  std::uint64_t maps_ = 1;
   std::map<LinkNumber, Link> links_;
   bool links_changed_ = false;
   bool map_changed_ = false;

@@ -21,7 +21,7 @@ class RouteRig {
                {nodes, groups}),
         pacer(fanout),
         retained(groups, fanout, pacer, retained_budget),
-        router(HubId{7}, {nodes, groups, fanout, pacer, retained}) {}
+        router(HubId{7}, {nodes, groups, routes, fanout, pacer, retained}) {}
   ~RouteRig() {
     for (const auto& recipient : recipients_made) {
       recipient->outbox.drop_all(proto::DropReason::link_lost, egress.context);
@@ -101,6 +101,7 @@ class RouteRig {
   Waker waker;
   NodeTable nodes;
   GroupTable groups;
+  RouteTable routes;
   RecipientTable recipients;
   Mailbox mailbox_here;
   Mailbox mailbox_there;

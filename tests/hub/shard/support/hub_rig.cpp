@@ -7,81 +7,6 @@
 
 namespace gimnet::hub::testing {
 
-void FakeNode::on_frame(const GotFrame& frame) {
-  kinds.push_back(frame.header.kind);
-  const bool is_data = static_cast<std::uint8_t>(frame.header.kind) < proto::kFirstControlKind &&
-                       frame.header.kind != proto::Kind::flow &&
-                       frame.header.kind != proto::Kind::report;
-  if (is_data) {
-    frames.push_back(frame);
-    ++data_frames;
-    return;
-  }
-  control.push_back(frame);
-  if (frame.header.kind == proto::Kind::link) {
-    if (const auto message = proto::decode<proto::Welcome>(frame.body)) {
-      welcome = *message;
-      if (!welcome->resumed) data_frames = 0;
-    }
-    if (const auto message = proto::decode<proto::Goodbye>(frame.body)) goodbye = *message;
-  } else if (frame.header.kind == proto::Kind::flow) {
-    const auto message = proto::flow::decode(frame.body);
-    if (!message) ADD_FAILURE() << "the hub sent FLOW that nobody can read";
-    if (const auto* skip = message ? std::get_if<proto::flow::Skip>(&*message) : nullptr) {
-      data_frames += skip->count;
-      skipped += skip->count;
-    }
-  }
-}
-
-void FakeNode::read(std::size_t most) {
-  pipe.read(stream, most);
-  std::size_t begin = 0;
-  if (!opened && stream.size() >= proto::kOpeningSize) {
-    if (!std::equal(proto::kOpening.begin(), proto::kOpening.end(), stream.begin()))
-      ADD_FAILURE() << "no opening";
-    opened = true;
-    begin = proto::kOpeningSize;
-  }
-  while (opened && stream.size() - begin >= proto::kHeaderSize) {
-    const proto::FrameHeader header = proto::load_header(stream.data() + begin);
-    if (header.length > proto::kFrameLengthMax) {
-      ADD_FAILURE() << "the hub sent a header with length " << header.length;
-      stream.clear();
-      return;
-    }
-    if (stream.size() - begin < header.frame_size()) break;
-    const auto body = stream.begin() + static_cast<std::ptrdiff_t>(begin + proto::kHeaderSize);
-    begin += header.frame_size();
-    on_frame({header, {body, body + header.length}});
-  }
-  stream.erase(stream.begin(), stream.begin() + static_cast<std::ptrdiff_t>(begin));
-}
-
-std::vector<std::string> FakeNode::texts() const {
-  std::vector<std::string> all;
-  for (const GotFrame& frame : frames) all.push_back(frame.text());
-  return all;
-}
-
-std::vector<proto::flow::Message> FakeNode::flow() const {
-  std::vector<proto::flow::Message> all;
-  for (const GotFrame& frame : control) {
-    if (frame.header.kind != proto::Kind::flow) continue;
-    if (const auto message = proto::flow::decode(frame.body)) all.push_back(*message);
-  }
-  return all;
-}
-
-std::vector<proto::Report> FakeNode::reports() const {
-  std::vector<proto::Report> all;
-  for (const GotFrame& frame : control) {
-    if (frame.header.kind != proto::Kind::report) continue;
-    if (const auto report = proto::decode_report(frame.body)) all.push_back(*report);
-  }
-  return all;
-}
-
 HubRig::HubRig(std::size_t shards, Limits limits)
     : limits_(limits), quiescence_(shards), budget_(limits.budget_bytes, shards), inbox_(shards) {
   std::vector<Mailbox*> mailboxes;
@@ -99,8 +24,8 @@ HubRig::HubRig(std::size_t shards, Limits limits)
     sessions_.push_back(std::make_unique<SessionGauges>(kGaugedSlots));
     sessions.push_back(sessions_.back().get());
   }
-  shared_.emplace(HubShared{hub(), limits_, nodes_, groups_, quiescence_, budget_, retained_budget_,
-                            inbox_, mailboxes, wakers, counters, sessions});
+  shared_.emplace(HubShared{hub(), limits_, nodes_, groups_, routes_, quiescence_, budget_,
+                            retained_budget_, inbox_, mailboxes, wakers, counters, sessions});
   for (std::size_t i = 0; i < shards; ++i) {
     shards_.push_back(std::make_unique<IoShard>(ShardIndex{static_cast<std::uint8_t>(i)}, *shared_,
                                                 IoShard::Options{}));
@@ -114,9 +39,17 @@ void HubRig::let_go() {
 }
 
 FakeNode& HubRig::join(std::size_t shard, const JoinSpec& spec) {
+  return begin(shard, make_id<NodeId>(hub(), next_index_), spec);
+}
+
+FakeNode& HubRig::link(std::size_t shard, HubId to, const JoinSpec& spec) {
+  return begin(shard, make_id<NodeId>(to, kHubIndex), spec);
+}
+
+FakeNode& HubRig::begin(std::size_t shard, NodeId id, const JoinSpec& spec) {
   FakeNode& node = nodes_played_.emplace_back();
   const std::uint32_t index = next_index_++;
-  node.id = make_id<NodeId>(hub(), index);
+  node.id = id;
   node.shard = ShardIndex{static_cast<std::uint8_t>(shard)};
   node.session = {ConnectionSlot{index}, 1000 + index};
   attach(node, spec, true);
@@ -146,16 +79,23 @@ void HubRig::attach(FakeNode& node, const JoinSpec& spec, bool new_session) {
   command.peer_resume_bytes = spec.resume_bytes;
   command.peer_frame_bytes = spec.frame_bytes;
   command.told.assign(spec.told.begin(), spec.told.end());
+  if (hub_of(node.id) != hub()) command.link = LinkAttach{{hub()}, 1'000};
   node.welcome.reset();
   node.goodbye.reset();
   this->command(node.shard.value(), std::move(command));
-  nodes_.publish(index_of(node.id), {node.shard, node.session.slot, node.session.generation});
+  publish(node, {node.shard, node.session.slot, node.session.generation});
   turn_shard(node.shard.value());
   node.read();
 }
 
+void HubRig::publish(const FakeNode& node, const NodePlace& place) {
+  const HubId of = hub_of(node.id);
+  if (of == hub()) return nodes_.publish(index_of(node.id), place);
+  routes_.publish(of, {place, of});
+}
+
 void HubRig::release(FakeNode& node) {
-  nodes_.publish(index_of(node.id), {});
+  publish(node, {});
   command(node.shard.value(), ReleaseCommand{node.session});
 }
 

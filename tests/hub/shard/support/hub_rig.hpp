@@ -14,18 +14,10 @@
 #include "proto/frame/flow.hpp"
 #include "proto/frame/frame_header.hpp"
 #include "proto/frame/report.hpp"
+#include "tests/hub/shard/support/fake_node.hpp"
 #include "tests/support/memory_stream.hpp"
 
 namespace gimnet::hub::testing {
-
-/// A frame as a node got it.
-struct GotFrame {
-  proto::FrameHeader header;
-  std::vector<std::byte> body;  ///< everything after the header
-  [[nodiscard]] std::string text() const {
-    return {reinterpret_cast<const char*>(body.data()), body.size()};
-  }
-};
 
 struct FrameSpec {
   proto::Kind kind = proto::Kind::unicast;
@@ -41,41 +33,6 @@ struct JoinSpec {
   std::uint32_t frame_bytes = proto::kFrameLengthDefault;
   std::uint32_t resume_bytes = 1u << 20;
   std::span<const std::byte> told{};  ///< control frames that it gets first
-};
-
-/// A node played by a test: the far end of its connection, and what came out of it.
-struct FakeNode {
-  NodeId id;
-  ShardIndex shard;
-  SessionRef session;
-  std::uint32_t attachment = 0;
-  MemoryPeer pipe;
-  std::vector<std::byte> stream;   ///< read and not taken apart yet
-  bool opened = false;             ///< the 8 opening bytes came
-  std::vector<GotFrame> frames;    ///< data frames
-  std::vector<GotFrame> control;   ///< FLOW, LINK, NS, CTRL and REPORT
-  std::vector<proto::Kind> kinds;  ///< of both, as they came
-  std::uint64_t data_frames = 0;   ///< of this epoch, SKIP included
-  std::uint64_t skipped = 0;
-  std::optional<proto::Welcome> welcome;
-  std::optional<proto::Goodbye> goodbye;
-
-  /// Takes everything that the hub sent (or `most` bytes of it) apart.
-  void read(std::size_t most = MemoryPeer::kAll);
-  [[nodiscard]] std::vector<std::string> texts() const;
-  [[nodiscard]] std::vector<proto::flow::Message> flow() const;
-  template <class Message>
-  [[nodiscard]] std::vector<Message> flow_of() const {
-    std::vector<Message> found;
-    for (const proto::flow::Message& message : flow()) {
-      if (const auto* match = std::get_if<Message>(&message)) found.push_back(*match);
-    }
-    return found;
-  }
-  [[nodiscard]] std::vector<proto::Report> reports() const;
-
- private:
-  void on_frame(const GotFrame& frame);
 };
 
 /// The sums of the ledger over all shards.
@@ -99,6 +56,8 @@ class HubRig {
 
   /// A new session on that shard. The reference stays good.
   FakeNode& join(std::size_t shard, const JoinSpec& spec = {});
+  /// A link to that hub, over which the route to it leads. The reference stays good.
+  FakeNode& link(std::size_t shard, HubId to, const JoinSpec& spec = {});
   /// Another connection for its session; its counts tell what it took so far.
   void rejoin(FakeNode& node, const JoinSpec& spec = {});
   /// A node that a test had attached by itself, with the far end of its connection. The reference
@@ -158,6 +117,7 @@ class HubRig {
   [[nodiscard]] HubId hub() const { return HubId{7}; }
   [[nodiscard]] NodeTable& nodes() { return nodes_; }
   [[nodiscard]] GroupTable& groups() { return groups_; }
+  [[nodiscard]] RouteTable& routes() { return routes_; }
   [[nodiscard]] Quiescence& quiescence() { return quiescence_; }
   [[nodiscard]] static std::uint32_t group(std::uint32_t index) {
     return make_id<GroupId>(HubId{7}, index).value();
@@ -166,6 +126,8 @@ class HubRig {
   std::uint64_t now_ms = 1'000'000;
 
  private:
+  void publish(const FakeNode& node, const NodePlace& place);
+  FakeNode& begin(std::size_t shard, NodeId id, const JoinSpec& spec);
   void attach(FakeNode& node, const JoinSpec& spec, bool new_session);
   void publish(std::uint32_t index, std::unique_ptr<GroupMembers> group);
   [[nodiscard]] std::uint64_t activity() const;
@@ -174,6 +136,7 @@ class HubRig {
   Limits limits_;
   NodeTable nodes_;
   GroupTable groups_;
+  RouteTable routes_;
   Quiescence quiescence_;
   Budget budget_;
   Budget retained_budget_{limits_.retained_budget_bytes};

@@ -1,0 +1,105 @@
+#include "hub/control/hub_link.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "base/check.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::nanoseconds;
+
+LinkCost cost_of(std::uint16_t configured) {
+  return configured != 0 ? LinkCost(configured) : LinkCost();
+}
+
+}  // namespace
+
+HubLink::HubLink(LinkNumber number, DialledLink dialled)
+    : number_(number), name_(dialled.name), dialled_(std::move(dialled)) {
+  address = dialled_->address.url();
+  cost_ = cost_of(dialled_->cost);
+}
+
+void HubLink::fix_cost(std::uint16_t cost) {
+  GIMNET_CHECK(is_dialled());
+  dialled_->cost = cost;
+  cost_ = cost_of(cost);
+}
+
+HubIdentity HubLink::identity() const {
+  GIMNET_CHECK(peer_.has_value());
+  return {peer_->hub, peer_->instance, peer_->configured};
+}
+
+void HubLink::begin_connection(const proto::HubIntroduction& said, const LinkTerms& own,
+                               milliseconds now) {
+  const bool same = peer_ && peer_->hub == said.hub && peer_->instance == said.instance;
+  if (!same) breaks_.clear();
+  peer_ = said;
+  connected_ = true;
+  exchange_begun = false;
+  keep_alive_ms_ = std::max(own.keep_alive_ms, said.keep_alive_ms);
+  silent_ms_ = std::max(own.silent_ms, said.silent_ms);
+  keep_alive_at_ = heard_at_ = now;
+  heard_sent_ns_ = heard_ns_ = 0;
+  clock_ = {};
+  cost_ = cost_of(is_dialled() ? dialled_->cost : said.cost);
+  resume_until_.reset();
+  dial_at_.reset();
+  backoff_.reset();
+  while (!breaks_.empty() && breaks_.front() + kBreaksWithin <= now) breaks_.pop_front();
+  damped_until_.reset();
+  if (breaks_.size() > kBreaksMost) {
+    const auto doublings = std::min<std::size_t>(breaks_.size() - kBreaksMost - 1, 4);
+    damped_until_ = now + std::min(milliseconds{1'000 << doublings}, kDampedMost);
+  }
+}
+
+void HubLink::end_connection(bool at_once, milliseconds now) {
+  connected_ = false;
+  damped_until_.reset();
+  if (at_once) {
+    epoch = 0;
+    return;
+  }
+  breaks_.push_back(now);
+  const auto round_trip = std::chrono::ceil<milliseconds>(clock_.round_trip_least);
+  resume_until_ = now + kResumeTime + 4 * round_trip;
+}
+
+proto::route::KeepAlive HubLink::say_keep_alive(std::uint64_t digest, milliseconds now,
+                                                std::int64_t wall_ns) {
+  keep_alive_at_ = now + milliseconds{keep_alive_ms_};
+  proto::route::KeepAlive said;
+  said.sent_ns = wall_ns;
+  said.heard_sent_ns = heard_sent_ns_;
+  said.heard_ns = heard_ns_;
+  said.digest = digest;
+  return said;
+}
+
+bool HubLink::hear_keep_alive(const proto::route::KeepAlive& heard, milliseconds now,
+                              std::int64_t wall_ns) {
+  heard_at_ = now;
+  heard_sent_ns_ = heard.sent_ns;
+  heard_ns_ = wall_ns;
+  if (heard.heard_sent_ns == 0) return false;
+  const std::int64_t held = heard.sent_ns - heard.heard_ns;
+  const nanoseconds round_trip{(wall_ns - heard.heard_sent_ns) - held};
+  // A clock that was set meanwhile tells nothing.
+  if (held < 0 || round_trip < nanoseconds{0} || round_trip > std::chrono::minutes(1)) return false;
+  if (clock_.round_trip_least == nanoseconds{0} || round_trip < clock_.round_trip_least) {
+    clock_.round_trip_least = std::max(round_trip, nanoseconds{1});
+    clock_.offset = nanoseconds{heard.sent_ns - wall_ns} + round_trip / 2;
+  }
+  return cost_.note_round_trip(clock_.round_trip_least);
+}
+
+void HubLink::dial_again(std::uint64_t random, milliseconds now) {
+  dial_at_ = now + milliseconds{backoff_.next_ns(random) / net::kNsPerMs};
+}
+
+}  // namespace gimnet::hub

@@ -1,0 +1,128 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <string>
+
+#include "hub/control/link_options.hpp"
+#include "hub/control/state/place.hpp"
+#include "hub/network/state/link_cost.hpp"
+#include "hub/network/state/network_state.hpp"
+#include "net/dial.hpp"
+#include "proto/control/link.hpp"
+#include "proto/control/route.hpp"
+
+namespace gimnet::hub {
+
+/// The clock of the hub at the other end of a link, compared with this hub's.
+struct LinkClock {
+  std::chrono::nanoseconds round_trip_least{};  ///< of this connection; 0: not measured
+  std::chrono::nanoseconds offset{};            ///< of the other clock to this one, measured then
+};
+
+/// One link as the conductor knows it: its other end, its connections, its times. Thread safety:
+/// the conductor's thread only. Time is an argument.
+class HubLink {
+ public:
+  /// After a break a link has so long to come back, and four times its lowest round trip.
+  static constexpr std::chrono::milliseconds kResumeTime{300};
+  /// A hub that met its own copy, or itself, tries again so often.
+  static constexpr std::chrono::milliseconds kCopyPause = std::chrono::seconds(10);
+  /// More breaks than this within kBreaksWithin damp the link.
+  static constexpr std::size_t kBreaksMost = 2;
+  static constexpr std::chrono::milliseconds kBreaksWithin = std::chrono::minutes(1);
+  static constexpr std::chrono::milliseconds kDampedMost = std::chrono::seconds(10);
+
+  /// A link that this hub dials.
+  HubLink(LinkNumber number, DialledLink dialled);
+  /// A link that the other side dialled.
+  HubLink(LinkNumber number, std::string name) : number_(number), name_(std::move(name)) {}
+
+  [[nodiscard]] LinkNumber number() const { return number_; }
+  [[nodiscard]] const std::string& name() const { return name_; }
+  [[nodiscard]] bool is_dialled() const { return dialled_.has_value(); }
+  /// REQUIRES: is_dialled().
+  [[nodiscard]] const DialledLink& dialled() const { return *dialled_; }
+  void fix_cost(std::uint16_t cost);
+
+  /// The other end, as HELLO or WELCOME said; of before the first connection: nothing.
+  [[nodiscard]] const std::optional<proto::HubIntroduction>& peer() const { return peer_; }
+  [[nodiscard]] HubIdentity identity() const;
+
+  /// A connection begins. `said` is what the other end said, `own` this end's terms.
+  void begin_connection(const proto::HubIntroduction& said, const LinkTerms& own,
+                        std::chrono::milliseconds now);
+  /// The connection broke. `at_once`: one end said GOODBYE, and nothing is resumed.
+  void end_connection(bool at_once, std::chrono::milliseconds now);
+  [[nodiscard]] bool connected() const { return connected_; }
+  /// Until then a broken link may be resumed, and frames wait. Nothing: it is not broken.
+  [[nodiscard]] std::optional<std::chrono::milliseconds> resume_until() const {
+    return resume_until_;
+  }
+  /// Its time to come back is over.
+  void give_up() { resume_until_.reset(); }
+  [[nodiscard]] std::uint32_t silent_ms() const { return silent_ms_; }
+  [[nodiscard]] std::optional<std::chrono::milliseconds> damped_until() const {
+    return damped_until_;
+  }
+  void end_damping() { damped_until_.reset(); }
+
+  /// When the next keep-alive is due; REQUIRES: connected().
+  [[nodiscard]] std::chrono::milliseconds keep_alive_at() const { return keep_alive_at_; }
+  [[nodiscard]] proto::route::KeepAlive say_keep_alive(std::uint64_t digest,
+                                                       std::chrono::milliseconds now,
+                                                       std::int64_t wall_ns);
+  /// True: the cost is another one now.
+  [[nodiscard]] bool hear_keep_alive(const proto::route::KeepAlive& heard,
+                                     std::chrono::milliseconds now, std::int64_t wall_ns);
+  [[nodiscard]] std::chrono::milliseconds heard_at() const { return heard_at_; }
+  [[nodiscard]] std::uint16_t cost() const {
+    return cost_.value().value_or(LinkCost::kLeastMeasured);
+  }
+  [[nodiscard]] const LinkClock& clock() const { return clock_; }
+
+  // Dialling. REQUIRES: is_dialled().
+  [[nodiscard]] std::optional<std::chrono::milliseconds> dial_at() const { return dial_at_; }
+  void dial_after(std::chrono::milliseconds pause, std::chrono::milliseconds now) {
+    dial_at_ = now + pause;
+  }
+  /// With the jitter of a random time. `random`: any 64 random bits.
+  void dial_again(std::uint64_t random, std::chrono::milliseconds now);
+  void note_dialling() { dial_at_.reset(); }
+
+  // Kept here for the owner.
+  std::optional<Place> place;    ///< while a shard knows it
+  std::uint32_t attachment = 0;  ///< numbers its connections
+  std::string address;           ///< of the other end
+  std::string last_error;
+  bool exchange_begun = false;  ///< on this connection
+  std::uint64_t epoch = 0;      ///< of this end; 0: the link cannot be resumed
+  std::uint64_t peer_epoch = 0;
+  std::uint64_t taken = 0;  ///< data frames of the last connection
+
+ private:
+  const LinkNumber number_;
+  const std::string name_;
+  std::optional<DialledLink> dialled_;
+  std::optional<proto::HubIntroduction> peer_;
+  bool connected_ = false;
+  std::uint32_t keep_alive_ms_ = kLinkKeepAliveMs;
+  std::uint32_t silent_ms_ = kLinkSilentMs;
+  std::chrono::milliseconds keep_alive_at_{};
+  std::chrono::milliseconds heard_at_{};
+  std::int64_t heard_sent_ns_ = 0;  ///< of the last keep-alive heard; 0: none
+  std::int64_t heard_ns_ = 0;
+  LinkCost cost_;
+  LinkClock clock_;
+  std::optional<std::chrono::milliseconds> resume_until_;
+  std::optional<std::chrono::milliseconds> dial_at_;
+  std::optional<std::chrono::milliseconds> damped_until_;
+  /// Under the same instance, within kBreaksWithin. Limit: the breaks of a minute, at least 50 ms
+  /// apart.
+  std::deque<std::chrono::milliseconds> breaks_;
+  net::DialBackoff backoff_;
+};
+
+}  // namespace gimnet::hub

@@ -1,0 +1,78 @@
+#include "hub/control/link_dialler.hpp"
+
+#include <pthread.h>
+
+#include <csignal>
+#include <system_error>
+
+#include "base/clock.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+/// The conductor alone takes signals.
+class SignalsBlocked {
+ public:
+  SignalsBlocked() {
+    sigset_t all;
+    ::sigfillset(&all);
+    ::pthread_sigmask(SIG_SETMASK, &all, &before_);
+  }
+  ~SignalsBlocked() { ::pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
+  SignalsBlocked(const SignalsBlocked&) = delete;
+  SignalsBlocked& operator=(const SignalsBlocked&) = delete;
+
+ private:
+  sigset_t before_{};
+};
+
+}  // namespace
+
+LinkDialler::~LinkDialler() {
+  cancel_.raise();
+  for (Attempt& attempt : attempts_) attempt.thread.join();
+}
+
+void LinkDialler::dial(LinkNumber link, const DialledLink& to, const proto::Hello& hello,
+                       const net::SocketOptions& options) {
+  Attempt& attempt = attempts_.emplace_back();
+  attempt.link = link;
+  try {
+    const SignalsBlocked blocked;
+    attempt.thread = std::thread([this, &attempt, address = to.address, hello, options] {
+      note(attempt, net::dial_hub(address, options, hello, steady_now_ns() + kAttemptNs, cancel_));
+    });
+  } catch (const std::system_error& error) {
+    attempts_.pop_back();
+    const std::lock_guard lock(mutex_);
+    ended_.emplace_back(link,
+                        net::NetError(net::Fault::no_memory,
+                                      std::string{"no thread to dial with: "} + error.what()));
+    waker_.wake();
+  }
+}
+
+void LinkDialler::note(Attempt& attempt, Outcome outcome) {
+  {
+    const std::lock_guard lock(mutex_);
+    ended_.emplace_back(attempt.link, std::move(outcome));
+  }
+  attempt.ended.store(true, std::memory_order_release);  // pairs with the acquire in take_ended()
+  waker_.wake();
+}
+
+std::vector<std::pair<LinkNumber, LinkDialler::Outcome>> LinkDialler::take_ended() {
+  for (auto attempt = attempts_.begin(); attempt != attempts_.end();) {
+    // acquire pairs with the release in note()
+    if (!attempt->ended.load(std::memory_order_acquire)) {
+      ++attempt;
+      continue;
+    }
+    attempt->thread.join();
+    attempt = attempts_.erase(attempt);
+  }
+  const std::lock_guard lock(mutex_);
+  return std::exchange(ended_, {});
+}
+
+}  // namespace gimnet::hub

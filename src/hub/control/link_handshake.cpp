@@ -1,0 +1,85 @@
+#include "hub/control/link_handshake.hpp"
+
+#include <string>
+
+#include "hub/shard/commands.hpp"
+
+namespace gimnet::hub {
+
+using proto::Goodbye;
+using proto::GoodbyeCode;
+
+std::optional<Goodbye> LinkHandshake::refusal(const Stranger& stranger,
+                                              const proto::Hello& hello) const {
+  if (!parts_.options.accept) {
+    return Goodbye{GoodbyeCode::not_allowed,
+                   "this hub takes no links; start it with --accept-links, or set accept_links = "
+                   "true below [links]"};
+  }
+  if (stranger.peer.transport == "unix" && !stranger.rights.administer) {
+    return Goodbye{GoodbyeCode::not_allowed,
+                   "over a Unix socket only the user that runs the hub, and root, may link"};
+  }
+  if (!hello.introduction || hello.introduction->link_name.empty())
+    return Goodbye{GoodbyeCode::malformed, "a HELLO of a hub without its id and the link's name"};
+  if (hello.introduction->features_required != 0) {
+    return Goodbye{GoodbyeCode::bad_version,
+                   "that hub requires features that this one does not have; use programs of one "
+                   "version"};
+  }
+  return std::nullopt;
+}
+
+std::optional<Goodbye> LinkHandshake::refusal_of(const proto::HubIntroduction& said,
+                                                 const LinkAdmissionAnswer& answer) const {
+  switch (answer.admission) {
+    case LinkAdmission::accept:
+      return std::nullopt;
+    case LinkAdmission::is_self:
+      return Goodbye{GoodbyeCode::copied, "the link leads back to the same hub; name another one"};
+    case LinkAdmission::ask_old_link:
+    case LinkAdmission::is_copy:
+      return Goodbye{GoodbyeCode::copied,
+                     "another hub with the same state folder is linked already; delete the state "
+                     "folder on one of the machines that have a copy of it"};
+    case LinkAdmission::id_taken:
+    case LinkAdmission::draw_again: {
+      const bool own = said.hub.hub == parts_.facts.id;
+      const std::string holder = own ? "hub '" + parts_.facts.name + "'" : "another hub";
+      return Goodbye{GoodbyeCode::id_taken, "hub id " + std::to_string(said.hub.hub.value()) +
+                                                " is taken by " + holder +
+                                                "; give one of them another one with --hub-id"};
+    }
+  }
+  return std::nullopt;
+}
+
+proto::HubIntroduction LinkHandshake::introduce(const LinkTerms& terms) const {
+  const HubIdentity& self = parts_.network.self();
+  proto::HubIntroduction said;
+  said.hub = self.key;
+  said.instance = self.instance;
+  said.configured = self.configured;
+  said.hub_name = parts_.facts.name;
+  said.version = parts_.facts.version.substr(0, proto::kIntroducedVersionBytesMax);
+  said.keep_alive_ms = terms.keep_alive_ms;
+  said.silent_ms = terms.silent_ms;
+  return said;
+}
+
+proto::Hello LinkHandshake::hello_for(const HubLink& link) const {
+  proto::Hello hello;
+  hello.role = proto::Role::hub;
+  hello.resume = true;
+  hello.epoch = link.epoch;
+  hello.resume_epoch = link.peer_epoch;
+  hello.resume_taken = link.taken;
+  hello.frame_length_max = static_cast<std::uint32_t>(parts_.limits.frame_bytes);
+  hello.resume_buffer_bytes = kLinkResumeBytes;
+  hello.introduction = introduce(link.dialled().terms);
+  hello.introduction->link_name = link.name();
+  hello.introduction->cost = link.dialled().cost;
+  return hello;
+}
+
+}  // namespace gimnet::hub

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <chrono>
+#include <optional>
+
+#include "hub/control/acceptor.hpp"
+#include "hub/control/hub_facts.hpp"
+#include "hub/control/hub_link.hpp"
+#include "hub/limits.hpp"
+#include "hub/network/state/network_state.hpp"
+#include "proto/control/link.hpp"
+
+namespace gimnet::hub {
+
+/// The words of a hub in HELLO and WELCOME of a link, and its judgement of the other end's. Thread
+/// safety: the conductor's thread only. Lifetime: its parts outlive it.
+class LinkHandshake {
+ public:
+  struct Parts {
+    const HubFacts& facts;
+    const Limits& limits;
+    const LinksOptions& options;
+    const NetworkState& network;
+  };
+  explicit LinkHandshake(const Parts& parts) : parts_(parts) {}
+
+  [[nodiscard]] proto::HubIntroduction introduce(const LinkTerms& terms) const;
+  /// REQUIRES: link.is_dialled().
+  [[nodiscard]] proto::Hello hello_for(const HubLink& link) const;
+  /// Why that stranger may not link, whoever its hub is; nothing: it may.
+  [[nodiscard]] std::optional<proto::Goodbye> refusal(const Stranger& stranger,
+                                                      const proto::Hello& hello) const;
+  /// The refusal of that hub at the other end of a link, which both ends look for; nothing: it may
+  /// be there. `answer`: that of NetworkState. REQUIRES: it is none that an old link is to be asked
+  /// about.
+  [[nodiscard]] std::optional<proto::Goodbye> refusal_of(const proto::HubIntroduction& said,
+                                                         const LinkAdmissionAnswer& answer) const;
+
+ private:
+  const Parts parts_;
+};
+
+}  // namespace gimnet::hub

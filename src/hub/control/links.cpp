@@ -1,0 +1,398 @@
+#include "hub/control/links.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "base/log.hpp"
+#include "hub/control/log_peer.hpp"
+#include "hub/shard/control_frame.hpp"
+#include "net/dial_handshake.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using proto::Goodbye;
+using proto::GoodbyeCode;
+using std::chrono::milliseconds;
+
+std::string hub_title(const proto::HubIntroduction& hub) {
+  return "hub " + std::to_string(hub.hub.hub.value()) +
+         (hub.hub_name.empty() ? std::string{} : " '" + hub.hub_name + "'");
+}
+
+/// A connection that nobody meant to end: it may be resumed.
+bool is_break(const DetachedEvent& event) {
+  return event.code == GoodbyeCode::silent ||
+         (event.code == GoodbyeCode::done && !event.said_by_peer);
+}
+
+}  // namespace
+
+Links::Links(LinksOptions options, const Wiring& wiring)
+    : options_(std::move(options)),
+      wiring_(wiring),
+      next_hops_(wiring.routes, wiring.shards),
+      network_({{wiring.facts.id, wiring.facts.unique},
+                wiring.facts.instance,
+                wiring.facts.id_configured},
+               {wiring.facts.name, wiring.facts.version}),
+      names_({{wiring.facts.id, wiring.facts.instance}, milliseconds{wiring.limits.grace_ms}}),
+      handshake_({wiring.facts, wiring.limits, options_, network_}) {
+  for (const DialledLink& link : options_.dial) static_cast<void>(add(link));
+}
+
+std::optional<Goodbye> Links::admit(Stranger& stranger, const proto::Hello& hello, Moment moment) {
+  if (auto refused = handshake_.refusal(stranger, hello)) return refused;
+  if (links_.size() >= kLinksMax)
+    return Goodbye{GoodbyeCode::hub_full, "this hub has as many links as there can be"};
+  if (auto refused = judge(*hello.introduction, moment)) return refused;
+  const proto::HubIntroduction& said = *hello.introduction;
+  HubLink* link = nullptr;
+  for (const auto& [number, each] : links_) {
+    const bool same = !each->is_dialled() && each->peer() &&
+                      each->peer()->hub.unique == said.hub.unique && each->name() == said.link_name;
+    if (same) link = each.get();
+  }
+  if (link == nullptr) {
+    const LinkNumber number{++last_number_};
+    link = links_.emplace(number, std::make_unique<HubLink>(number, said.link_name))
+               .first->second.get();
+  }
+  link->address = stranger.peer.address;
+  AttachCommand command;
+  command.transport = std::move(stranger.transport);
+  command.resume_wanted = hello.resume;
+  command.peer_epoch = hello.epoch;
+  command.known_hub_epoch = hello.resume_epoch;
+  command.known_taken = hello.resume_taken;
+  command.peer_resume_bytes = hello.resume_buffer_bytes;
+  command.peer_frame_bytes = hello.frame_length_max;
+  command.welcome.node = make_id<NodeId>(said.hub.hub, kHubIndex);
+  command.welcome.hub = wiring_.facts.id;
+  command.welcome.hub_name = wiring_.facts.name;
+  command.welcome.frame_length_max = static_cast<std::uint32_t>(wiring_.limits.frame_bytes);
+  command.welcome.hub_time_ns = moment.wall_ns;
+  command.welcome.introduction = handshake_.introduce(options_.accepted);
+  attach(*link, std::move(command), said, options_.accepted, moment);
+  advance(moment);
+  return std::nullopt;
+}
+
+/// A hub that started again is the one that its old link leads to; a copy of it is another one, and
+/// the first one was heard within two keep-alives.
+std::optional<Goodbye> Links::judge(const proto::HubIntroduction& said, Moment moment) {
+  const LinkAdmissionAnswer answer = network_.admit({said.hub, said.instance, said.configured});
+  if (answer.admission != LinkAdmission::ask_old_link) return handshake_.refusal_of(said, answer);
+  HubLink* old = find(answer.old_link);
+  if (old == nullptr) return std::nullopt;
+  const bool alive =
+      old->connected() && moment.now - old->heard_at() < milliseconds{2 * kLinkKeepAliveMs};
+  if (alive) return handshake_.refusal_of(said, answer);
+  close(*old, GoodbyeCode::replaced, "the hub started again");
+  end_connection(*old, true, moment);
+  return std::nullopt;
+}
+
+void Links::dial_due(HubLink& link, Moment moment) {
+  if (!link.dial_at() || moment.now < *link.dial_at() || draining_) return;
+  link.note_dialling();
+  const bool resumes = link.resume_until() && link.epoch != 0;
+  if (!resumes) {
+    link.epoch = wiring_.random() | 1;  // 0: none
+    link.peer_epoch = link.taken = 0;
+  }
+  wiring_.dial(link.number(), link.dialled(), handshake_.hello_for(link));
+}
+
+void Links::on_dialled(LinkNumber number, Result<net::Welcomed, net::NetError> outcome,
+                       Moment moment) {
+  HubLink* link = find(number);
+  if (link == nullptr || link->connected() || draining_) return;
+  const auto fail = [&](const std::string& sentence, bool copied) {
+    if (link->last_error != sentence)
+      log_line(LogLevel::warning, {"link", link->name()}, "link " + link->name() + ": " + sentence);
+    link->last_error = sentence;
+    if (copied) return link->dial_after(HubLink::kCopyPause, moment.now);
+    link->dial_again(wiring_.random(), moment.now);
+  };
+  if (!outcome)
+    return fail(outcome.error().sentence, outcome.error().goodbye == GoodbyeCode::copied);
+  const proto::Welcome& welcome = outcome->welcome;
+  const auto refuse = [&](const Goodbye& goodbye) {
+    const auto bytes = net::encode_goodbye(goodbye.code, goodbye.sentence);
+    const iovec piece{const_cast<std::byte*>(bytes.data()), bytes.size()};
+    static_cast<void>(outcome->stream->send({&piece, 1}));
+    fail("ended the link: " + goodbye.sentence, goodbye.code == GoodbyeCode::copied);
+  };
+  if (!welcome.introduction)
+    return refuse({GoodbyeCode::malformed, "the peer's WELCOME is not one for a hub"});
+  if (const auto refused = judge(*welcome.introduction, moment)) return refuse(*refused);
+  AttachCommand command;
+  command.transport = std::move(outcome->stream);
+  command.resume_wanted = true;
+  command.peer_epoch = welcome.epoch;
+  command.known_taken = welcome.taken;
+  command.peer_resume_bytes = welcome.resume_buffer_bytes;
+  command.peer_frame_bytes = welcome.frame_length_max;
+  command.link.emplace();
+  command.link->dialled = true;
+  command.link->resumed = welcome.resumed && link->place.has_value();
+  command.link->epoch = link->epoch;
+  link->peer_epoch = welcome.epoch;
+  attach(*link, std::move(command), *welcome.introduction, link->dialled().terms, moment);
+  begin_exchange(*link, moment);
+  advance(moment);
+}
+
+void Links::attach(HubLink& link, AttachCommand command, const proto::HubIntroduction& said,
+                   const LinkTerms& terms, Moment moment) {
+  // Frames that wait are for hubs behind the former peer, and a shard knows a link by its hub.
+  if (link.place && link.peer() && link.peer()->hub.hub != said.hub.hub) withdraw(link);
+  if (!link.place) {
+    link.place = wiring_.slots.take();
+    by_generation_[link.place->generation] = link.number();
+  }
+  const bool again = link.attachment != 0;
+  link.begin_connection(said, terms, moment.now);
+  link.last_error.clear();
+  command.session = ref_of(*link.place);
+  command.attachment = ++link.attachment;
+  command.node = make_id<NodeId>(said.hub.hub, kHubIndex);
+  if (!command.link) command.link.emplace();
+  command.link->rule.own = wiring_.facts.id;
+  command.link->rule.allow = terms.allow;
+  std::ranges::sort(command.link->rule.allow);
+  command.link->silent_ms = link.silent_ms();
+  wiring_.shards.send(link.place->shard, std::move(command));
+  log_line(LogLevel::info, {"link", link.name()},
+           std::string{again ? "linked again" : "linked"} + (link.is_dialled() ? " to " : " by ") +
+               hub_title(said) + ", " + link.address + ", link " + link.name());
+}
+
+/// The side that dialled begins: what a refused attempt costs is a HELLO.
+void Links::begin_exchange(HubLink& link, Moment moment) {
+  link.exchange_begun = true;
+  network_.begin_connection(
+      link.number(), {link.identity(), link.name(), link.is_dialled(), link.cost()}, moment.now);
+  network_.set_damped(link.number(), link.damped_until().has_value());
+  names_.begin_connection(link.number(), moment.now);
+}
+
+void Links::on_route(const SessionRef& session, std::uint32_t attachment,
+                     std::span<const std::byte> payload, Moment moment) {
+  HubLink* link = find(session);
+  if (link == nullptr || !link->connected() || link->attachment != attachment) return;
+  if (!link->exchange_begun) begin_exchange(*link, moment);
+  const auto control = proto::split_control(payload);
+  if (!control) return;
+  switch (static_cast<proto::route::Operation>(control->header.operation)) {
+    case proto::route::Operation::record:
+      network_.take_record(link->number(), {payload.begin(), payload.end()}, moment.now);
+      break;
+    case proto::route::Operation::records_end:
+      network_.take_mark(link->number());
+      break;
+    case proto::route::Operation::keep_alive: {
+      const auto heard = proto::decode<proto::route::KeepAlive>(payload);
+      if (!heard) break;
+      if (link->hear_keep_alive(*heard, moment.now, moment.wall_ns))
+        network_.set_cost(link->number(), link->cost());
+      network_.take_digest(link->number(), heard->digest, moment.now);
+      break;
+    }
+    case proto::route::Operation::names_known:
+    case proto::route::Operation::names:
+    case proto::route::Operation::names_taken:
+      names_.take(link->number(), payload, moment.now);
+      break;
+  }
+  advance(moment);
+}
+
+void Links::on_detached(const DetachedEvent& event, Moment moment) {
+  HubLink* link = find(event.session);
+  if (link == nullptr || !link->connected() || link->attachment != event.attachment) return;
+  link->epoch = event.epoch;
+  link->peer_epoch = event.peer_epoch;
+  link->taken = event.taken;
+  const bool said = event.said_by_peer || event.code != GoodbyeCode::done;
+  link->last_error = said ? (event.said_by_peer ? "the other hub said goodbye: " : "closed: ") +
+                                std::string{proto::goodbye_name(event.code)} +
+                                (event.sentence.empty() ? "" : ": ") + event.sentence
+                          : "the connection broke";
+  log_line(LogLevel::warning, {"link", link->name()},
+           "link " + link->name() + " to " + hub_title(*link->peer()) + ": " + link->last_error);
+  end_connection(*link, !is_break(event), moment);
+  advance(moment);
+}
+
+void Links::end_connection(HubLink& link, bool at_once, Moment moment) {
+  link.end_connection(at_once, moment.now);
+  if (at_once) withdraw(link);
+  if (link.is_dialled()) link.dial_again(wiring_.random(), moment.now);
+}
+
+void Links::withdraw(HubLink& link) {
+  link.give_up();
+  link.epoch = 0;
+  network_.end_link(link.number());
+  names_.end_link(link.number());
+  if (!link.place) return;
+  const Place place = *std::exchange(link.place, std::nullopt);
+  by_generation_.erase(place.generation);
+  // Shards stop to look the link up before it goes.
+  publish_routes();
+  wiring_.shards.send(place.shard, ReleaseCommand{ref_of(place)});
+  wiring_.slots.give_back(place);
+}
+
+void Links::close(const HubLink& link, GoodbyeCode code, std::string sentence) {
+  if (link.place && link.connected())
+    wiring_.shards.send(link.place->shard,
+                        CloseCommand{ref_of(*link.place), code, std::move(sentence)});
+}
+
+void Links::tick(Moment moment) {
+  std::vector<LinkNumber> gone;
+  for (const auto& [number, link] : links_) {
+    if (link->resume_until() && *link->resume_until() <= moment.now) withdraw(*link);
+    if (!link->connected() && !link->place && !link->is_dialled()) gone.push_back(number);
+    if (link->damped_until() && *link->damped_until() <= moment.now) {
+      link->end_damping();
+      network_.set_damped(number, false);
+    }
+    if (link->is_dialled()) dial_due(*link, moment);
+    if (link->connected() && link->keep_alive_at() <= moment.now) {
+      send(*link, proto::Kind::route,
+           proto::encode(link->say_keep_alive(network_.digest(), moment.now, moment.wall_ns)));
+    }
+  }
+  for (const LinkNumber number : gone) links_.erase(number);
+  advance(moment);
+}
+
+std::optional<milliseconds> Links::next_deadline() const {
+  std::optional<milliseconds> due = links_.empty() ? std::nullopt : network_.next_due();
+  const auto note = [&due](std::optional<milliseconds> time) {
+    if (time && (!due || *time < *due)) due = time;
+  };
+  note(names_.next_due());
+  for (const auto& [number, link] : links_) {
+    note(link->resume_until());
+    note(link->damped_until());
+    if (!draining_) note(link->dial_at());
+    if (link->connected()) note(link->keep_alive_at());
+  }
+  return due;
+}
+
+void Links::advance(Moment moment) {
+  network_.advance(moment.now);
+  send_all(network_.take_sendings());
+  publish_routes();
+  if (map_seen_ != network_.maps()) {
+    map_seen_ = network_.maps();
+    names_.set_reachable(network_.map(), network_.store(), moment.now);
+  }
+  names_.advance(moment.now);
+  send_all(names_.take_sendings());
+  if (const Verdict verdict = network_.verdict(); verdict != Verdict::stay)
+    leave_network(verdict, moment);
+}
+
+void Links::send_all(std::span<const Sending> sendings) {
+  for (const Sending& sending : sendings) {
+    const HubLink* link = find(sending.link);
+    if (link != nullptr && link->connected()) send(*link, proto::Kind::route, *sending.bytes);
+  }
+}
+
+/// It serves its own nodes, and tries again.
+void Links::leave_network(Verdict verdict, Moment moment) {
+  const bool copied = verdict == Verdict::copied;
+  const std::string sentence =
+      copied ? "another machine runs a copy of this state folder; delete it on one of them"
+             : "hub id " + std::to_string(wiring_.facts.id.value()) +
+                   " is kept by another hub of the network; give one of them another one with "
+                   "--hub-id";
+  log_line(LogLevel::error, {"left", "network"}, "left the network: " + sentence);
+  network_.leave();
+  for (const auto& [number, link] : links_) {
+    if (!link->place) continue;
+    close(*link, copied ? GoodbyeCode::copied : GoodbyeCode::id_taken, sentence);
+    if (link->connected()) link->end_connection(true, moment.now);
+    withdraw(*link);
+    link->last_error = sentence;
+    if (!link->is_dialled()) continue;
+    if (copied) {
+      link->dial_after(HubLink::kCopyPause, moment.now);
+    } else {
+      link->dial_after(milliseconds{250 + wiring_.random() % 250}, moment.now);
+    }
+  }
+}
+
+void Links::publish_routes() {
+  next_hops_.publish(network_.map().next_hops(), [this](LinkNumber number) {
+    const HubLink* link = find(number);
+    if (link == nullptr || !link->place) return NextHop{};
+    const Place& place = *link->place;
+    return NextHop{{place.shard, place.slot, place.generation}, link->peer()->hub.hub};
+  });
+}
+
+void Links::send(const HubLink& link, proto::Kind kind, std::span<const std::byte> payload) {
+  SendControlCommand command;
+  command.session = ref_of(*link.place);
+  command.attachment = link.attachment;
+  command.frame = control_frame(kind, NodeId{}, wiring_.facts.id, payload);
+  wiring_.shards.send(link.place->shard, std::move(command));
+}
+
+HubLink* Links::find(LinkNumber number) {
+  const auto found = links_.find(number);
+  return found == links_.end() ? nullptr : found->second.get();
+}
+
+HubLink* Links::find(const SessionRef& session) {
+  const auto found = by_generation_.find(session.generation);
+  return found == by_generation_.end() ? nullptr : find(found->second);
+}
+
+std::string Links::add(const DialledLink& link) {
+  if (find(link.name) != nullptr)
+    return "there is a link '" + link.name + "' already; give another name";
+  if (links_.size() >= kLinksMax) return "this hub has as many links as there can be";
+  const LinkNumber number{++last_number_};
+  auto& added = links_.emplace(number, std::make_unique<HubLink>(number, link)).first->second;
+  added->dial_after(milliseconds{0}, milliseconds{0});
+  return {};
+}
+
+std::string Links::remove(std::string_view name) {
+  HubLink* const link = find(name);
+  if (link == nullptr) return "there is no link '" + std::string{name} + "'; see gimnet links";
+  close(*link, GoodbyeCode::done, "the link was removed");
+  withdraw(*link);
+  links_.erase(link->number());
+  return {};
+}
+
+std::string Links::set_cost(std::string_view name, std::uint16_t cost) {
+  HubLink* const link = find(name);
+  if (link == nullptr || !link->is_dialled())
+    return "this hub dials no link '" + std::string{name} + "'; its cost is decided by the dialler";
+  link->fix_cost(cost);
+  // The other end hears of it by the next HELLO.
+  close(*link, GoodbyeCode::replaced, "the link has another cost");
+  return {};
+}
+
+HubLink* Links::find(std::string_view name) {
+  for (const auto& [number, link] : links_) {
+    if (link->name() == name) return link.get();
+  }
+  return nullptr;
+}
+
+}  // namespace gimnet::hub

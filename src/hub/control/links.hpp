@@ -1,0 +1,115 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/result.hpp"
+#include "hub/control/acceptor.hpp"
+#include "hub/control/hub_facts.hpp"
+#include "hub/control/hub_link.hpp"
+#include "hub/control/link_handshake.hpp"
+#include "hub/control/next_hops.hpp"
+#include "hub/control/shard_proxy.hpp"
+#include "hub/control/state/slot_pool.hpp"
+#include "hub/limits.hpp"
+#include "hub/network/state/name_exchange.hpp"
+#include "hub/network/state/network_state.hpp"
+#include "net/dial.hpp"
+
+namespace gimnet::hub {
+
+/// The links of this hub: admits and dials them, carries the routes between NetworkState and its
+/// neighbours, and publishes the next hops. Thread safety: the conductor's thread only. Time is an
+/// argument. Ownership: of the places of its links; what it is wired to outlives it. Limits:
+/// kLinksMax links.
+class Links {
+ public:
+  static constexpr std::size_t kLinksMax = 4'093;
+
+  /// A dial that was asked for; on_dialled() tells how it ended.
+  using Dial = std::function<void(LinkNumber, const DialledLink&, const proto::Hello&)>;
+  struct Wiring {
+    const HubFacts& facts;
+    const Limits& limits;
+    ShardProxy& shards;
+    SlotPool& slots;
+    RouteTable& routes;
+    Dial dial;
+    std::function<std::uint64_t()> random;  ///< 64 bits that nobody can guess
+  };
+  /// Clocks at one moment.
+  struct Moment {
+    std::chrono::milliseconds now{};  ///< monotonic
+    std::int64_t wall_ns = 0;         ///< since 1970
+  };
+  Links(LinksOptions options, const Wiring& wiring);
+
+  /// Judges a HELLO of role hub: takes the stranger's transport and hands it to a shard, or says
+  /// why not.
+  [[nodiscard]] std::optional<proto::Goodbye> admit(Stranger& stranger, const proto::Hello& hello,
+                                                    Moment moment);
+  void on_dialled(LinkNumber number, Result<net::Welcomed, net::NetError> outcome, Moment moment);
+  /// The payload of a ROUTE frame from that connection.
+  void on_route(const SessionRef& session, std::uint32_t attachment,
+                std::span<const std::byte> payload, Moment moment);
+  void on_detached(const DetachedEvent& event, Moment moment);
+  void tick(Moment moment);
+  [[nodiscard]] std::optional<std::chrono::milliseconds> next_deadline() const;
+  /// No link is dialled or taken any more.
+  void drain() { draining_ = true; }
+
+  [[nodiscard]] NextHops& next_hops() { return next_hops_; }
+  [[nodiscard]] const NetworkState& network() const { return network_; }
+  /// The names of all hubs. Changes of own names are sent with the next advance(), at once.
+  [[nodiscard]] NameExchange& names() { return names_; }
+  /// Says what is due, and publishes what follows from it.
+  void advance(Moment moment);
+
+  [[nodiscard]] const std::map<LinkNumber, std::unique_ptr<HubLink>>& all() const { return links_; }
+  // As in NetworkView.
+  [[nodiscard]] std::string add(const DialledLink& link);
+  [[nodiscard]] std::string remove(std::string_view name);
+  [[nodiscard]] std::string set_cost(std::string_view name, std::uint16_t cost);
+
+ private:
+  /// Why that hub may not be at the other end of a link; nothing: it may.
+  [[nodiscard]] std::optional<proto::Goodbye> judge(const proto::HubIntroduction& said,
+                                                    Moment moment);
+  void dial_due(HubLink& link, Moment moment);
+  void attach(HubLink& link, AttachCommand command, const proto::HubIntroduction& said,
+              const LinkTerms& terms, Moment moment);
+  void begin_exchange(HubLink& link, Moment moment);
+  void end_connection(HubLink& link, bool at_once, Moment moment);
+  /// Its routes go, and what waits for it is lost.
+  void withdraw(HubLink& link);
+  void close(const HubLink& link, proto::GoodbyeCode code, std::string sentence);
+  void send_all(std::span<const Sending> sendings);
+  void leave_network(Verdict verdict, Moment moment);
+  void publish_routes();
+  void send(const HubLink& link, proto::Kind kind, std::span<const std::byte> payload);
+  [[nodiscard]] HubLink* find(LinkNumber number);
+  [[nodiscard]] HubLink* find(const SessionRef& session);
+  [[nodiscard]] HubLink* find(std::string_view name);
+
+  const LinksOptions options_;
+  const Wiring wiring_;
+  NextHops next_hops_;
+  NetworkState network_;
+  NameExchange names_;
+  const LinkHandshake handshake_;  ///< of these
+  std::uint64_t map_seen_ = 0;     ///< the map that the names were told of
+  std::map<LinkNumber, std::unique_ptr<HubLink>> links_;
+  std::map<std::uint32_t, LinkNumber> by_generation_;  ///< of those with a place
+  std::uint32_t last_number_ = 0;
+  bool draining_ = false;
+};
+
+}  // namespace gimnet::hub

@@ -1,0 +1,100 @@
+#include "hub/control/network_overview.hpp"
+
+#include <algorithm>
+
+namespace gimnet::hub {
+namespace {
+
+std::vector<HubView::Edge> edges_of(const HubRecord& record) {
+  std::vector<HubView::Edge> edges;
+  record.each_counting([&edges](const StoredPart& part) {
+    for (const auto& neighbour : part.said.neighbours)
+      edges.push_back({neighbour.hub.hub, neighbour.cost});
+  });
+  return edges;
+}
+
+}  // namespace
+
+std::vector<HubView> NetworkOverview::hubs() const {
+  std::vector<HubView> hubs;
+  const auto& store = parts_.links.network().store();
+  const auto view = [&](const proto::HubKey& key) {
+    HubView hub;
+    hub.hub = key.hub;
+    if (const HubRecord* record = store.find(key); record != nullptr) {
+      if (const auto* head = record->head(); head != nullptr) {
+        hub.name = head->name;
+        hub.version = head->version;
+      }
+      hub.neighbours = edges_of(*record);
+    }
+    return hub;
+  };
+  HubView self = view(parts_.links.network().self().key);
+  self.name = parts_.facts.name;
+  self.version = parts_.facts.version;
+  self.reachable = true;
+  hubs.push_back(std::move(self));
+  for (const Way& way : parts_.links.network().map().ways()) {
+    HubView hub = view(way.hub);
+    hub.distance = way.hops;
+    hub.cost = way.cost;
+    hub.reachable = way.link != LinkNumber{};
+    hub.too_far = !hub.reachable;
+    hub.via = parts_.links.next_hops().find(way.hub.hub).neighbour;
+    hubs.push_back(std::move(hub));
+  }
+  const auto& reachable = parts_.links.network().map().reachable();
+  for (const auto& [key, record] : store.records()) {
+    if (record.head() != nullptr && !std::ranges::binary_search(reachable, key))
+      hubs.push_back(view(key));
+  }
+  std::sort(hubs.begin() + 1, hubs.end(),
+            [](const HubView& a, const HubView& b) { return a.hub < b.hub; });
+  return hubs;
+}
+
+std::vector<LinkView> NetworkOverview::links() const {
+  std::vector<LinkView> links;
+  for (const auto& [number, link] : parts_.links.all()) links.push_back(view_of(*link));
+  return links;
+}
+
+LinkState NetworkOverview::state_of(const HubLink& link) const {
+  if (!link.connected()) return link.resume_until() ? LinkState::away : LinkState::dialling;
+  if (!parts_.links.network().is_up(link.number())) return LinkState::learning;
+  if (link.damped_until()) return LinkState::damped;
+  const auto& next = parts_.links.next_hops().find(link.peer()->hub.hub);
+  const bool carries = !next.exists() || next.neighbour != link.peer()->hub.hub ||
+                       next.link.generation == link.place->generation;
+  return carries ? LinkState::up : LinkState::standby;
+}
+
+LinkView NetworkOverview::view_of(const HubLink& link) const {
+  LinkView view;
+  view.name = link.name();
+  view.peer = link.address;
+  view.dialled = link.is_dialled();
+  view.state = state_of(link);
+  view.last_error = link.last_error;
+  view.cost = link.cost();
+  if (link.peer()) view.hub = link.peer()->hub.hub;
+  const LinkClock& clock = link.clock();
+  view.rtt_us = static_cast<std::uint32_t>(
+      std::chrono::ceil<std::chrono::microseconds>(clock.round_trip_least).count());
+  view.clock_offset_ns = clock.offset.count();
+  view.clock_error_ns = (clock.round_trip_least / 2).count();
+  if (!link.place || link.place->shard.value() >= parts_.sessions.size()) return view;
+  const SessionCounts counts =
+      parts_.sessions[link.place->shard.value()]->counts(link.place->slot, link.place->generation);
+  view.queued_bytes = counts.queued_bytes;
+  view.sent_bytes = counts.sent_bytes;
+  view.received_bytes = counts.received_bytes;
+  view.accepted = counts.accepted;
+  view.delivered = counts.delivered;
+  view.dropped = counts.dropped;
+  return view;
+}
+
+}  // namespace gimnet::hub

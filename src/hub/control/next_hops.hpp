@@ -1,0 +1,53 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "hub/control/shard_proxy.hpp"
+#include "hub/data/tables/route_table.hpp"
+#include "hub/network/state/network_map.hpp"
+
+namespace gimnet::hub {
+
+/// The next hops as the shards see them: publishes what changes, and sends control frames along
+/// them. Thread safety: the conductor's thread only. Lifetime: its parts outlive it.
+class NextHops {
+ public:
+  NextHops(RouteTable& routes, ShardProxy& shards) : routes_(routes), shards_(shards) {}
+
+  /// Publishes the hops that differ from before. `place_of(LinkNumber)` gives the NextHop of a
+  /// link, none if no shard has it.
+  template <class PlaceOf>
+  void publish(const std::array<LinkNumber, NetworkMap::kHubIds>& links, PlaceOf&& place_of) {
+    for (std::size_t hub = 0; hub < links.size(); ++hub) {
+      if (links[hub] == LinkNumber{} && !published_[hub].exists()) continue;
+      const NextHop next = links[hub] == LinkNumber{} ? NextHop{} : place_of(links[hub]);
+      if (next == published_[hub]) continue;
+      published_[hub] = next;
+      routes_.publish(HubId{static_cast<std::uint16_t>(hub)}, next);
+    }
+  }
+
+  [[nodiscard]] const NextHop& find(HubId hub) const {
+    return published_[hub.value() % published_.size()];
+  }
+  /// Sends a control frame to the next hop towards that hub, unless it came from there. False:
+  /// there is no route.
+  bool send_towards(HubId hub, std::vector<std::byte> frame, HubId from = kOwnHub) {
+    const NextHop& next = find(hub);
+    if (!next.exists() || (from != kOwnHub && next.neighbour == from)) return false;
+    SendControlCommand command;
+    command.session = {next.link.slot, next.link.generation};
+    command.frame = std::move(frame);
+    shards_.send(next.link.shard, std::move(command));
+    return true;
+  }
+
+ private:
+  RouteTable& routes_;
+  ShardProxy& shards_;
+  std::array<NextHop, RouteTable::kHubIds> published_{};
+};
+
+}  // namespace gimnet::hub

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+
+#include "base/check.hpp"
+#include "base/ids.hpp"
+#include "hub/data/tables/node_table.hpp"
+
+namespace gimnet::hub {
+
+/// The next hop of frames for another hub: the link that carries there, and the hub behind it.
+struct NextHop {
+  NodePlace link;  ///< as a node's place: the link is a session on a shard, too
+  HubId neighbour;
+
+  [[nodiscard]] bool exists() const { return link.exists(); }
+  friend bool operator==(const NextHop&, const NextHop&) = default;
+};
+
+/// Hub id to next hop. Thread safety: one writer (the conductor), any number of readers; reads are
+/// wait-free. A reader may see the link of one publish() and the neighbour of another: that costs
+/// the check against sending a frame back, once.
+class RouteTable {
+ public:
+  static constexpr std::size_t kHubIds = 4096;
+
+  /// A place with generation 0: there is no route. REQUIRES: hub < 4096.
+  void publish(HubId hub, const NextHop& next) {
+    GIMNET_CHECK(hub.value() < kHubIds);
+    neighbours_[hub.value()].store(next.neighbour.value(), std::memory_order_relaxed);
+    // release pairs with the acquire in find(): who sees the link sees its neighbour.
+    links_[hub.value()].store(pack(next.link), std::memory_order_release);
+  }
+  [[nodiscard]] NextHop find(HubId hub) const {
+    // acquire pairs with the release in publish()
+    const NodePlace link = unpack(links_[hub.value()].load(std::memory_order_acquire));
+    return {link, HubId{neighbours_[hub.value()].load(std::memory_order_relaxed)}};
+  }
+
+ private:
+  std::array<std::atomic<std::uint64_t>, kHubIds> links_{};
+  std::array<std::atomic<std::uint16_t>, kHubIds> neighbours_{};
+};
+
+}  // namespace gimnet::hub

@@ -1,0 +1,98 @@
+#include "hub/control/hub_link.hpp"
+
+#include <gtest/gtest.h>
+
+namespace gimnet::hub {
+namespace {
+
+using std::chrono::milliseconds;
+
+proto::HubIntroduction introduction(std::uint64_t instance = 1) {
+  proto::HubIntroduction said;
+  said.hub.hub = HubId{9};
+  said.instance = proto::HubInstance{instance};
+  said.keep_alive_ms = 100;
+  said.silent_ms = 3'000;
+  return said;
+}
+
+/// Begins a connection and breaks it, so many times.
+void break_often(HubLink& link, int times, milliseconds now, std::uint64_t instance = 1) {
+  for (int i = 0; i < times; ++i) {
+    link.begin_connection(introduction(instance), {}, now);
+    link.end_connection(false, now);
+  }
+}
+
+TEST(HubLink, TheLargerTimesOfBothEndsCount) {
+  HubLink link(LinkNumber{1}, "up");
+  link.begin_connection(introduction(), {}, milliseconds{1'000});
+  EXPECT_EQ(link.silent_ms(), 3'000u);
+  static_cast<void>(link.say_keep_alive(0, milliseconds{1'000}, 0));
+  EXPECT_EQ(link.keep_alive_at(), milliseconds{1'000 + kLinkKeepAliveMs});
+}
+
+TEST(HubLink, MayComeBackForItsTimeAndFourRoundTrips) {
+  HubLink link(LinkNumber{1}, "up");
+  link.begin_connection(introduction(), {}, milliseconds{1'000});
+  proto::route::KeepAlive heard;
+  heard.heard_sent_ns = 1'000'000'000;
+  heard.heard_ns = heard.sent_ns = 7'000'000'000;
+  // 20 ms after it was sent, and not held there.
+  EXPECT_TRUE(link.hear_keep_alive(heard, milliseconds{1'020}, 1'020'000'000));
+  EXPECT_EQ(link.cost(), LinkCost::kLeastMeasured + 20);
+  EXPECT_EQ(link.clock().offset, std::chrono::nanoseconds{7'000'000'000 - 1'010'000'000});
+  link.end_connection(false, milliseconds{2'000});
+  EXPECT_EQ(link.resume_until(), milliseconds{2'000 + 300 + 80});
+}
+
+TEST(HubLink, AClockThatWasSetMeanwhileTellsNothing) {
+  HubLink link(LinkNumber{1}, "up");
+  link.begin_connection(introduction(), {}, milliseconds{0});
+  proto::route::KeepAlive heard;
+  heard.heard_sent_ns = 2'000'000'000;
+  heard.heard_ns = heard.sent_ns = 5;
+  EXPECT_FALSE(link.hear_keep_alive(heard, milliseconds{10}, 1'000'000'000))
+      << "sent in the future";
+  EXPECT_EQ(link.clock().round_trip_least.count(), 0);
+}
+
+TEST(HubLink, IsDampedFromTheThirdBreakOn) {
+  HubLink link(LinkNumber{1}, "up");
+  const milliseconds now{100'000};
+  break_often(link, 2, now);
+  link.begin_connection(introduction(), {}, now);
+  EXPECT_FALSE(link.damped_until());
+  link.end_connection(false, now);
+  link.begin_connection(introduction(), {}, now);
+  EXPECT_EQ(link.damped_until(), now + milliseconds{1'000});
+  link.end_connection(false, now);
+  link.begin_connection(introduction(), {}, now);
+  EXPECT_EQ(link.damped_until(), now + milliseconds{2'000});
+  break_often(link, 20, now);
+  link.begin_connection(introduction(), {}, now);
+  EXPECT_EQ(link.damped_until(), now + HubLink::kDampedMost);
+  link.end_connection(false, now);
+  link.begin_connection(introduction(), {}, now + HubLink::kBreaksWithin);
+  EXPECT_FALSE(link.damped_until()) << "a minute without a break";
+}
+
+TEST(HubLink, ARestartOfTheOtherHubIsNoBreakOfTheLink) {
+  HubLink link(LinkNumber{1}, "up");
+  for (std::uint64_t instance = 1; instance < 10; ++instance)
+    break_often(link, 1, milliseconds{100'000}, instance);
+  link.begin_connection(introduction(50), {}, milliseconds{100'000});
+  EXPECT_FALSE(link.damped_until());
+}
+
+TEST(HubLink, AfterAGoodbyeNothingIsResumed) {
+  HubLink link(LinkNumber{1}, "up");
+  link.begin_connection(introduction(), {}, milliseconds{0});
+  link.epoch = 5;
+  link.end_connection(true, milliseconds{0});
+  EXPECT_FALSE(link.resume_until());
+  EXPECT_EQ(link.epoch, 0u);
+}
+
+}  // namespace
+}  // namespace gimnet::hub

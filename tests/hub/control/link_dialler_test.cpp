@@ -1,0 +1,47 @@
+#include "hub/control/link_dialler.hpp"
+
+#include <gtest/gtest.h>
+#include <poll.h>
+
+#include "net/address.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+DialledLink to_nobody() {
+  DialledLink link;
+  link.address = *net::parse_address("unix:/nowhere/at/all.sock");
+  link.name = "nobody";
+  return link;
+}
+
+/// Waits until the dialler says that an attempt ended.
+std::vector<std::pair<LinkNumber, LinkDialler::Outcome>> wait(LinkDialler& dialler) {
+  for (;;) {
+    dialler.waker().prepare_to_sleep();
+    auto ended = dialler.take_ended();
+    if (!ended.empty()) return ended;
+    pollfd ready{dialler.waker().descriptor(), POLLIN, 0};
+    EXPECT_EQ(::poll(&ready, 1, 60'000), 1);
+    dialler.waker().clear();
+    dialler.waker().awake();
+  }
+}
+
+TEST(LinkDialler, TellsWhyNobodyAnswers) {
+  LinkDialler dialler;
+  dialler.dial(LinkNumber{4}, to_nobody(), {}, {});
+  auto ended = wait(dialler);
+  ASSERT_EQ(ended.size(), 1u);
+  EXPECT_EQ(ended[0].first, LinkNumber{4});
+  ASSERT_FALSE(ended[0].second);
+  EXPECT_NE(ended[0].second.error().sentence.find("/nowhere/at/all.sock"), std::string::npos);
+}
+
+TEST(LinkDialler, EndsWithAttemptsUnderWay) {
+  LinkDialler dialler;
+  for (std::uint32_t i = 1; i <= 10; ++i) dialler.dial(LinkNumber{i}, to_nobody(), {}, {});
+}
+
+}  // namespace
+}  // namespace gimnet::hub

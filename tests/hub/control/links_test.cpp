@@ -1,0 +1,151 @@
+#include "hub/control/links.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/hub/control/support/link_rig.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using proto::GoodbyeCode;
+using std::chrono::milliseconds;
+
+constexpr HubId kA{1};
+constexpr HubId kB{2};
+
+TEST(Links, BothEndsHaveARouteOnceTheRecordsHaveCome) {
+  LinkedRigs hubs;
+  hubs.connect();
+  EXPECT_FALSE(hubs.a.routes.find(kB).exists()) << "nothing was said yet";
+  hubs.carry();
+  for (int i = 0; i < 3; ++i) hubs.pass(NetworkState::kMapPause);
+  EXPECT_EQ(hubs.a.routes.find(kB).neighbour, kB);
+  EXPECT_EQ(hubs.b.routes.find(kA).neighbour, kA);
+  EXPECT_EQ(hubs.b.attached().node, make_id<NodeId>(kA, kHubIndex));
+  EXPECT_TRUE(hubs.b.attached().link->dialled);
+  EXPECT_FALSE(hubs.a.attached().link->dialled);
+}
+
+TEST(Links, TheSideThatDialledBegins) {
+  LinkedRigs hubs;
+  hubs.connect();
+  EXPECT_TRUE(hubs.a.take_frames().empty()) << "a refused attempt must not carry all records";
+  EXPECT_FALSE(hubs.b.take_frames().empty());
+}
+
+TEST(Links, ABrokenLinkKeepsItsRoutesForItsTimeToComeBack) {
+  LinkedRigs hubs;
+  hubs.link();
+  hubs.a.detach(hubs.a.attached());
+  hubs.a.pass(HubLink::kResumeTime - milliseconds{1});
+  EXPECT_TRUE(hubs.a.routes.find(kB).exists());
+  EXPECT_TRUE(hubs.a.shards.all<ReleaseCommand>().empty());
+  hubs.a.pass(milliseconds{1});
+  EXPECT_FALSE(hubs.a.routes.find(kB).exists());
+  EXPECT_EQ(hubs.a.shards.all<ReleaseCommand>().size(), 1u) << "what waits for it is lost";
+}
+
+TEST(Links, AGoodbyeWithdrawsALinkAtOnce) {
+  LinkedRigs hubs;
+  hubs.link();
+  hubs.a.detach(hubs.a.attached(), GoodbyeCode::draining, true);
+  EXPECT_FALSE(hubs.a.routes.find(kB).exists());
+}
+
+TEST(Links, ALinkThatComesBackSaysWhatItHadTaken) {
+  LinkedRigs hubs;
+  hubs.link();
+  const AttachCommand& before = hubs.b.attached();
+  const SessionRef session = before.session;
+  hubs.b.detach(before);
+  hubs.a.detach(hubs.a.attached());
+  hubs.b.pass(milliseconds{50});  // at most that long after a first break
+  hubs.connect(true);
+  const proto::Hello& hello = hubs.b.dialled.back().hello;
+  EXPECT_EQ(hello.epoch, 11u);
+  EXPECT_EQ(hello.resume_epoch, 12u);
+  EXPECT_EQ(hello.resume_taken, 5u);
+  EXPECT_TRUE(hubs.b.attached().link->resumed);
+  EXPECT_EQ(hubs.b.attached().session.generation, session.generation);
+  EXPECT_EQ(hubs.b.attached().attachment, 2u);
+  EXPECT_TRUE(hubs.b.routes.find(kA).exists()) << "frames wait meanwhile";
+}
+
+TEST(Links, OnlyAHubThatSaysSoTakesThem) {
+  LinkRig hub(1, {});
+  proto::Hello hello;
+  hello.role = proto::Role::hub;
+  const auto refusal = hub.admit(hello);
+  ASSERT_TRUE(refusal);
+  EXPECT_EQ(refusal->code, GoodbyeCode::not_allowed);
+  EXPECT_NE(refusal->sentence.find("--accept-links"), std::string::npos);
+}
+
+TEST(Links, OfTwoHubsWithOneIdTheNewcomerIsTold) {
+  LinkedRigs hubs;
+  LinkRig twin(1, LinkRig::dialling());
+  twin.links.tick(twin.moment());
+  proto::Hello hello = twin.dialled.back().hello;
+  hello.introduction->hub.unique.bytes[5] = 9;
+  hello.introduction->instance = proto::HubInstance{77};
+  const auto refusal = hubs.a.admit(hello);
+  ASSERT_TRUE(refusal);
+  EXPECT_EQ(refusal->code, GoodbyeCode::id_taken);
+  EXPECT_NE(refusal->sentence.find("--hub-id"), std::string::npos);
+}
+
+TEST(Links, AHubThatMeetsItselfTriesAgainLater) {
+  LinkRig hub(1, LinkRig::dialling());
+  hub.links.tick(hub.moment());
+  const auto refusal = hub.admit(hub.dialled.back().hello);
+  ASSERT_TRUE(refusal);
+  EXPECT_EQ(refusal->code, GoodbyeCode::copied);
+  net::NetError error(net::Fault::refused, refusal->sentence);
+  error.goodbye = refusal->code;
+  hub.links.on_dialled(hub.dialled.back().link, error, hub.moment());
+  hub.pass(HubLink::kCopyPause - milliseconds{1});
+  EXPECT_EQ(hub.dialled.size(), 1u);
+  hub.pass(milliseconds{1});
+  EXPECT_EQ(hub.dialled.size(), 2u);
+}
+
+TEST(Links, DialsAgainForEverWithinASecond) {
+  LinkRig hub(1, LinkRig::dialling());
+  for (std::size_t attempt = 1; attempt <= 20; ++attempt) {
+    hub.links.tick(hub.moment());
+    ASSERT_EQ(hub.dialled.size(), attempt);
+    hub.links.on_dialled(hub.dialled.back().link, net::NetError(net::Fault::no_peer, "nobody"),
+                         hub.moment());
+    hub.now += milliseconds{1'000};
+  }
+}
+
+TEST(Links, TheShorterOfTwoWaysIsTakenAndTheOtherWhenItEnds) {
+  LinkedRigs hubs(LinkRig::dialling("first", 5));
+  hubs.link();
+  const std::uint32_t first = hubs.a.routes.find(kB).link.generation;
+  LinkedRigs::carry(hubs.a, hubs.b);
+  DialledLink second = LinkRig::dialling("second", 3).dial.front();
+  ASSERT_EQ(hubs.b.links.add(second), "");
+  EXPECT_NE(hubs.b.links.add(second), "") << "the name is taken";
+  hubs.connect();
+  hubs.pass(milliseconds{100});
+  hubs.pass(milliseconds{100});
+  const std::uint32_t cheaper = hubs.a.routes.find(kB).link.generation;
+  EXPECT_NE(cheaper, first);
+  ASSERT_EQ(hubs.b.links.remove("second"), "");
+  EXPECT_NE(hubs.b.links.remove("second"), "") << "there is none any more";
+}
+
+TEST(Links, KeepAlivesMeasureTheRoundTripAndTheOtherClock) {
+  LinkedRigs hubs;
+  hubs.a.clock_ahead_ns = 5'000'000'000;
+  hubs.link();
+  for (int i = 0; i < 3; ++i) hubs.pass(milliseconds{250});
+  const auto& link = *hubs.b.links.all().begin()->second;
+  EXPECT_EQ(link.clock().offset, std::chrono::seconds(5));
+  EXPECT_GT(link.clock().round_trip_least.count(), 0);
+}
+
+}  // namespace
+}  // namespace gimnet::hub
