@@ -279,7 +279,7 @@ std::uint32_t Outbound::id() {
 void Outbound::on_pause(const proto::flow::Target& target) {
   const MutexLock lock(mutex_);
   ++pause_count_;
-  pauses_.pause(target);
+  pauses_.pause(target, steady_now_ns());
 }
 
 void Outbound::on_resume(const proto::flow::Target& target) {

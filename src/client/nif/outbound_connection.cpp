@@ -45,6 +45,7 @@ void Outbound::drop_held() {
 
 void Outbound::look_after_held() {
   const Inside inside(*this);
+  if (pauses_.lift_overdue(hub_of(NodeId{id_}), steady_now_ns())) notify_waiting();
   if (state_ != State::connected || held_.empty()) return;
   for (const HeldMessage& held : held_) {
     if (held.progress.windowed && held.progress.window.room() == 0) probe(held.progress);

@@ -2,8 +2,9 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <set>
+#include <map>
 
+#include "base/ids.hpp"
 #include "proto/frame/flow.hpp"
 #include "proto/frame/frame_header.hpp"
 
@@ -15,15 +16,26 @@ namespace gimnet::nif {
   return (static_cast<std::uint64_t>(kind) << 40) | (static_cast<std::uint64_t>(lane) << 32) | dst;
 }
 
-/// The destinations that the hub has paused. In order, which no choice of destinations can make
-/// slow. Thread safety: guarded by its owner.
+/// The destinations that a hub has paused. In order, which no choice of destinations can make slow.
+/// Thread safety: guarded by its owner. Time is an argument.
 class PauseTable {
  public:
   /// A hub that pauses more than this is not obeyed further.
   static constexpr std::size_t kPausesMax = 65'536;
+  /// A pause about another hub holds for so long, unless it is said again: its RESUME may be lost
+  /// with a link (docs/protocol.md, section 10).
+  static constexpr std::int64_t kRemoteNs = 1'000'000'000;
 
-  void pause(const proto::flow::Target& target) {
-    if (paused_.size() < kPausesMax) paused_.insert(code(target));
+  void pause(const proto::flow::Target& target, std::int64_t now_ns) {
+    if (paused_.size() < kPausesMax || paused_.contains(code(target)))
+      paused_[code(target)] = now_ns;
+  }
+  /// Lifts those about other hubs than `own` whose time is over. True: there were some.
+  bool lift_overdue(HubId own, std::int64_t now_ns) {
+    return std::erase_if(paused_, [&](const auto& each) {
+             const NodeId dst{static_cast<std::uint32_t>(each.first)};
+             return hub_of(dst) != own && now_ns - each.second >= kRemoteNs;
+           }) != 0;
   }
   void resume(const proto::flow::Target& target) { paused_.erase(code(target)); }
   [[nodiscard]] bool is_paused(std::uint64_t stream) const {
@@ -37,7 +49,7 @@ class PauseTable {
   static constexpr std::uint64_t code(const proto::flow::Target& target) {
     return stream_code(target.kind, static_cast<std::uint8_t>(target.lane), target.dst);
   }
-  std::set<std::uint64_t> paused_;
+  std::map<std::uint64_t, std::int64_t> paused_;  ///< since when
 };
 
 }  // namespace gimnet::nif
