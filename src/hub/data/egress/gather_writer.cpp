@@ -106,8 +106,9 @@ void GatherWriter::gather_lanes(Batch& batch, Job& job) {
   std::size_t filled = 0;
   std::size_t only = 0;
   for (std::size_t lane = 0; lane < cursors.size(); ++lane) {
-    if (job.outbox.lane(lane).empty()) continue;
-    cursors[lane].number = job.outbox.lane(lane).entries().first_number();
+    const RingQueue<Entry>& entries = job.outbox.lane(lane).entries();
+    if (entries.empty()) continue;
+    cursors[lane].number = entries.first_number();
     load(cursors[lane], lane, job);
     ++filled;
     only = lane;

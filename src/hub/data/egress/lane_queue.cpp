@@ -86,7 +86,7 @@ void LaneQueue::discount(const Entry& entry) {
   if (entry.touched) touched_bytes_ -= entry.size;
 }
 
-void LaneQueue::push(Entry entry) {
+void LaneQueue::push(Entry&& entry) {
   if (counts_sources_) note_source(entry);
   count(entry);
   if (!entries_.empty()) {

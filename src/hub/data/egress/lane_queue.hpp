@@ -52,7 +52,7 @@ class LaneQueue {
 
   /// Adds the entry, or joins it to the last one where both are plain runs of the same header in
   /// neighbouring memory, and not too much to be dropped at a time.
-  void push(Entry entry);
+  void push(Entry&& entry);
   /// Counts more frames into the last entry, behind which the caller has put them. REQUIRES: it is
   /// plain, of one piece, and they have its header.
   void extend(Entry& last, std::uint32_t bytes, std::uint32_t frames) {
