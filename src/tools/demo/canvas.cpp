@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/check.hpp"
+#include "proto/bitestream/utf8.hpp"
 
 namespace gimnet::demo {
 namespace {
@@ -11,24 +12,19 @@ namespace {
 constexpr int kExtentMax = 1000;
 constexpr char32_t kReplacement = U'\uFFFD';
 
-// The character at the front, and its bytes in `size`; kReplacement and 1 for what is no UTF-8 (RFC
-// 3629).
+// The character at the front, and its bytes in `size`; kReplacement and 1 for a byte that begins
+// none.
 char32_t decode_front(std::string_view text, std::size_t& size) {
-  const auto byte = [&](std::size_t index) { return static_cast<unsigned char>(text[index]); };
-  const unsigned char lead = byte(0);
-  size = 1;
-  if (lead < 0x80) return lead;
-  const std::size_t length = lead >= 0xF0 ? 4 : lead >= 0xE0 ? 3 : 2;
-  if (lead < 0xC2 || lead > 0xF4 || text.size() < length) return kReplacement;
-  char32_t code = lead & (0x7FU >> length);
-  for (std::size_t index = 1; index < length; ++index) {
-    if ((byte(index) & 0xC0U) != 0x80U) return kReplacement;
-    code = (code << 6U) | (byte(index) & 0x3FU);
+  const auto* bytes = reinterpret_cast<const unsigned char*>(text.data());
+  const unsigned char lead = bytes[0];
+  size = lead < 0x80 ? 1 : lead >= 0xF0 ? 4 : lead >= 0xE0 ? 3 : 2;
+  if (size == 1) return lead;
+  if (size > text.size() || !proto::bitestream::valid_utf8(bytes, size)) {
+    size = 1;
+    return kReplacement;
   }
-  constexpr char32_t kLeast[] = {0, 0, 0x80, 0x800, 0x10000};
-  const bool surrogate = code >= 0xD800 && code <= 0xDFFF;
-  if (code < kLeast[length] || code > 0x10FFFF || surrogate) return kReplacement;
-  size = length;
+  char32_t code = lead & (0x7FU >> size);
+  for (std::size_t index = 1; index < size; ++index) code = (code << 6U) | (bytes[index] & 0x3FU);
   return code;
 }
 
@@ -143,39 +139,30 @@ Plot::Dot Plot::dot_of(const Point& point) const {
       (view_.centre.y_m - point.y_m) / view_.metres_per_dot + extent_.rows * kDotRows / 2.0};
 }
 
-Box Plot::seen() const {
-  const double half_width_m = extent_.columns * kDotColumns / 2.0 * view_.metres_per_dot;
-  const double half_height_m = extent_.rows * kDotRows / 2.0 * view_.metres_per_dot;
-  return {{view_.centre.x_m - half_width_m, view_.centre.y_m - half_height_m},
-          {view_.centre.x_m + half_width_m, view_.centre.y_m + half_height_m}};
+Plot::Patch* Plot::patch_at(const Dot& dot) {
+  const bool inside = dot.column >= 0.0 && dot.row >= 0.0 &&
+                      dot.column < extent_.columns * kDotColumns &&
+                      dot.row < extent_.rows * kDotRows;
+  if (!inside) return nullptr;
+  return &patches_[static_cast<std::size_t>(dot.row) / kDotRows *
+                       static_cast<std::size_t>(extent_.columns) +
+                   static_cast<std::size_t>(dot.column) / kDotColumns];
 }
 
-Plot::Patch* Plot::patch_at(long column, long row) {
-  if (column < 0 || row < 0) return nullptr;
-  const long x = column / kDotColumns;
-  const long y = row / kDotRows;
-  if (x >= extent_.columns || y >= extent_.rows) return nullptr;
-  return &patches_[static_cast<std::size_t>(y) * static_cast<std::size_t>(extent_.columns) +
-                   static_cast<std::size_t>(x)];
-}
-
-void Plot::set(long column, long row, Ink ink) {
-  Patch* patch = patch_at(column, row);
+void Plot::set(const Dot& dot, Ink ink) {
+  Patch* patch = patch_at(dot);
   if (patch == nullptr) return;
   // Bits of the braille patterns: Unicode, chapter 21.1.
   constexpr std::uint8_t kBits[kDotRows][kDotColumns] = {
       {0x01, 0x08}, {0x02, 0x10}, {0x04, 0x20}, {0x40, 0x80}};
-  const std::uint8_t bit = kBits[row % kDotRows][column % kDotColumns];
+  const std::uint8_t bit =
+      kBits[static_cast<int>(dot.row) % kDotRows][static_cast<int>(dot.column) % kDotColumns];
   patch->dots = static_cast<std::uint8_t>(patch->dots | bit);
   if (ink == Ink::kRobot) patch->robot_dots = static_cast<std::uint8_t>(patch->robot_dots | bit);
   patch->ink = std::max(patch->ink, ink);
 }
 
-void Plot::dot(const Point& point, Ink ink) {
-  const Dot at = dot_of(point);
-  if (std::abs(at.column) > 1e6 || std::abs(at.row) > 1e6) return;
-  set(static_cast<long>(std::floor(at.column)), static_cast<long>(std::floor(at.row)), ink);
-}
+void Plot::dot(const Point& point, Ink ink) { set(dot_of(point), ink); }
 
 void Plot::fill(const Box& box, Ink ink) {
   const Dot low = dot_of({box.least.x_m, box.most.y_m});
@@ -193,7 +180,7 @@ void Plot::fill(const Box& box, Ink ink) {
   for (long row = first(low.row, rows); row <= last(low.row, high.row, rows); ++row) {
     for (long column = first(low.column, columns); column <= last(low.column, high.column, columns);
          ++column) {
-      set(column, row, ink);
+      set({.column = static_cast<double>(column), .row = static_cast<double>(row)}, ink);
     }
   }
 }
@@ -209,8 +196,7 @@ void Plot::line(const Point& from, const Point& to, Ink ink) {
 }
 
 void Plot::triangle(const Point& a, const Point& b, const Point& c, Ink ink) {
-  const Box box{{std::min({a.x_m, b.x_m, c.x_m}), std::min({a.y_m, b.y_m, c.y_m})},
-                {std::max({a.x_m, b.x_m, c.x_m}), std::max({a.y_m, b.y_m, c.y_m})}};
+  const Box box = Box{a, a}.widened(b).widened(c);
   const double step_m = view_.metres_per_dot / 2.0;
   const int columns = static_cast<int>((box.most.x_m - box.least.x_m) / step_m);
   const int rows = static_cast<int>((box.most.y_m - box.least.y_m) / step_m);
@@ -225,11 +211,7 @@ void Plot::triangle(const Point& a, const Point& b, const Point& c, Ink ink) {
 }
 
 void Plot::ground(const Point& point, Ground ground) {
-  const Dot at = dot_of(point);
-  if (std::abs(at.column) > 1e6 || std::abs(at.row) > 1e6) return;
-  Patch* patch =
-      patch_at(static_cast<long>(std::floor(at.column)), static_cast<long>(std::floor(at.row)));
-  if (patch != nullptr) patch->ground = std::max(patch->ground, ground);
+  if (Patch* patch = patch_at(dot_of(point))) patch->ground = std::max(patch->ground, ground);
 }
 
 void Plot::draw(Canvas& canvas, ScreenPlace corner) const {

@@ -10,7 +10,7 @@
 
 namespace gimnet::demo {
 
-/// What a character means, from which its colour follows. In a plot a later one lies over an
+/// The meaning of a character, from which its colour follows. In a plot a later one lies over an
 /// earlier one.
 enum class Ink : std::uint8_t {
   kPlain,
@@ -28,7 +28,7 @@ enum class Ink : std::uint8_t {
   kRobot,
 };
 
-/// What lies under a character.
+/// The background of a character.
 enum class Ground : std::uint8_t { kNone, kSeen, kBeam, kBar };
 
 /// Character columns and rows.
@@ -58,7 +58,7 @@ struct Glyph {
   bool operator==(const Glyph&) const = default;
 };
 
-/// A screen full of characters, to be drawn on and then shown. What lies outside is not drawn. All
+/// A screen full of characters, to be drawn on and then shown. Nothing is drawn outside. All
 /// characters are one column wide. Thread safety: one thread.
 class Canvas {
  public:
@@ -92,16 +92,10 @@ class Canvas {
 /// Appends the UTF-8 of one character. REQUIRES: a Unicode scalar value.
 void append_utf8(std::string& text, char32_t code);
 
-/// Which part of the world a plot shows: y goes up, a dot is a square.
+/// The part of the world that a plot shows: y goes up, a dot is a square.
 struct View {
   Point centre;
   double metres_per_dot = 0.1;
-};
-
-/// A rectangle of the world.
-struct Box {
-  Point least;
-  Point most;
 };
 
 /// A picture in dots, 2 by 4 to a character: Unicode's braille patterns are a display of that
@@ -129,8 +123,6 @@ class Plot {
   void ground(const Point& point, Ground ground);
 
   [[nodiscard]] const View& view() const { return view_; }
-  /// The part of the world that is seen.
-  [[nodiscard]] Box seen() const;
 
   /// Copies the picture onto a canvas.
   void draw(Canvas& canvas, ScreenPlace corner) const;
@@ -148,8 +140,9 @@ class Plot {
   };
 
   [[nodiscard]] Dot dot_of(const Point& point) const;
-  [[nodiscard]] Patch* patch_at(long column, long row);
-  void set(long column, long row, Ink ink);
+  /// Null: outside.
+  [[nodiscard]] Patch* patch_at(const Dot& dot);
+  void set(const Dot& dot, Ink ink);
 
   Extent extent_;
   View view_;

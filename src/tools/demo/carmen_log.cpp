@@ -14,30 +14,7 @@
 namespace gimnet::demo {
 namespace {
 
-// Words of a line; blanks between them, as fscanf would take them.
-class Words {
- public:
-  explicit Words(std::string_view line) : rest_(line) {}
-
-  [[nodiscard]] std::optional<std::string_view> next() {
-    const std::size_t begin = rest_.find_first_not_of(" \t");
-    if (begin == std::string_view::npos) return std::nullopt;
-    const std::size_t end = rest_.find_first_of(" \t", begin);
-    const std::string_view word =
-        rest_.substr(begin, end == std::string_view::npos ? end : end - begin);
-    rest_ = end == std::string_view::npos ? std::string_view{} : rest_.substr(end);
-    ++taken_;
-    return word;
-  }
-
-  [[nodiscard]] std::size_t taken() const { return taken_; }
-
- private:
-  std::string_view rest_;
-  std::size_t taken_ = 0;
-};
-
-// What a person can read of bytes that may be anything.
+// Bytes that may be anything, as a person can read them.
 std::string quoted(std::string_view text) {
   constexpr std::size_t kShown = 24;
   std::string shown;
@@ -62,26 +39,27 @@ constexpr Range kDistance{0.0, 1e4};
 constexpr Range kSpeed{-1e4, 1e4};
 constexpr Range kStamp{0.0, 1e11};
 
-// Reads named numbers from words and keeps the first complaint; after it, everything answers 0.
+// Reads the words of a line, blanks between them as fscanf takes them, and named numbers from them.
+// Keeps the first complaint; after it, everything answers 0.
 class Fields {
  public:
-  Fields(std::string_view message, Words& words) : message_(message), words_(words) {}
+  explicit Fields(std::string_view line) : rest_(line) { message_ = next_word(); }
+
+  /// The first word; empty: there is none.
+  [[nodiscard]] std::string_view message() const { return message_; }
 
   double number(std::string_view name, const Range& range) {
-    const std::optional<std::string_view> word = next(name);
-    if (!word) return 0.0;
+    const std::string_view word = next(name);
+    if (word.empty()) return 0.0;
     double value = 0.0;
-    const auto [end, code] = std::from_chars(word->data(), word->data() + word->size(), value);
-    if (code != std::errc{} || end != word->data() + word->size() || !std::isfinite(value)) {
-      complain(fmt::format("{}: {} is {}, which is no number", message_, name, quoted(*word)));
-      return 0.0;
-    }
-    if (value < range.least || value > range.most) {
+    const auto [end, code] = std::from_chars(word.data(), word.data() + word.size(), value);
+    if (code != std::errc{} || end != word.data() + word.size() || !std::isfinite(value)) {
+      complain(fmt::format("{}: {} is {}, which is no number", message_, name, quoted(word)));
+    } else if (value < range.least || value > range.most) {
       complain(fmt::format("{}: {} is {}, outside {} .. {}", message_, name, value, range.least,
                            range.most));
-      return 0.0;
     }
-    return value;
+    return complaint_.empty() ? value : 0.0;
   }
 
   Pose pose(std::string_view prefix) {
@@ -95,10 +73,8 @@ class Fields {
   void skip_word(std::string_view name) { (void)next(name); }
 
   void end() {
-    if (complaint_.empty() && words_.next()) {
-      complain(
-          fmt::format("{}: more than the {} fields it should have", message_, words_.taken() - 1));
-    }
+    if (!next_word().empty())
+      complain(fmt::format("{}: more fields than it should have", message_));
   }
 
   void complain(std::string sentence) {
@@ -108,15 +84,22 @@ class Fields {
   [[nodiscard]] const std::string& complaint() const { return complaint_; }
 
  private:
-  std::optional<std::string_view> next(std::string_view name) {
-    if (!complaint_.empty()) return std::nullopt;
-    const std::optional<std::string_view> word = words_.next();
-    if (!word) complain(fmt::format("{}: the line ends before {}; was it cut?", message_, name));
+  std::string_view next_word() {
+    rest_.remove_prefix(std::min(rest_.find_first_not_of(" \t"), rest_.size()));
+    const std::string_view word = rest_.substr(0, rest_.find_first_of(" \t"));
+    rest_.remove_prefix(word.size());
+    return word;
+  }
+  std::string_view next(std::string_view name) {
+    if (!complaint_.empty()) return {};
+    const std::string_view word = next_word();
+    if (word.empty())
+      complain(fmt::format("{}: the line ends before {}; was it cut?", message_, name));
     return word;
   }
 
+  std::string_view rest_;
   std::string_view message_;
-  Words& words_;
   std::string complaint_;
 };
 
@@ -160,24 +143,22 @@ bool is_message_name(std::string_view word) {
 }  // namespace
 
 Result<LineKind> parse_carmen_line(std::string_view line, LogRecord& record) {
-  Words words(line);
-  const std::optional<std::string_view> name = words.next();
-  if (!name || name->front() == '#') return LineKind::kIgnored;
-  Fields fields(*name, words);
+  Fields fields(line);
+  const std::string_view name = fields.message();
   record = LogRecord{};
-  if (*name == "ODOM") {
+  if (name == "ODOM") {
     read_odometry(fields, record);
-  } else if (*name == "FLASER") {
+  } else if (name == "FLASER") {
     read_scan(fields, record);
-  } else if (is_message_name(*name)) {
+  } else if (name.empty() || name.front() == '#' || is_message_name(name)) {
     return LineKind::kIgnored;
   } else {
     return Error{fmt::format(
         "the line begins with {}, which is no CARMEN message (expected ODOM, FLASER, PARAM, ...)",
-        quoted(*name))};
+        quoted(name))};
   }
   if (!fields.complaint().empty()) return Error{fields.complaint()};
-  return *name == "FLASER" ? LineKind::kScan : LineKind::kOdometry;
+  return name == "FLASER" ? LineKind::kScan : LineKind::kOdometry;
 }
 
 Result<RobotLog> load_robot_log(const std::string& path) {
@@ -250,49 +231,20 @@ bool stamps_usable(const RobotLog& log) {
   return stamped > 0 && (different.size() * 4 >= stamped || stamped < 4);
 }
 
-// A stamp far from the ones before and behind it is a slip of the recorder, not a time.
-bool is_slip(double stamp_s, std::optional<double> before_s, std::optional<double> behind_s) {
-  const auto far_from = [stamp_s](std::optional<double> other_s) {
-    return other_s && std::abs(stamp_s - *other_s) > kLongestPause_s;
-  };
-  return far_from(before_s) && (far_from(behind_s) || !behind_s);
-}
-
-// The stamps that can be followed; 0 for records without one.
-std::vector<double> followed_stamps(const RobotLog& log) {
-  std::vector<double> stamps(log.records.size(), 0.0);
-  std::optional<double> before_s;
-  std::size_t behind = 0;
-  for (std::size_t index = 0; index < stamps.size(); ++index) {
-    const double stamp_s = log.records[index].stamp_s;
-    if (stamp_s == 0.0) continue;
-    behind = std::max(behind, index + 1);
-    while (behind < stamps.size() && log.records[behind].stamp_s == 0.0) ++behind;
-    const std::optional<double> behind_s =
-        behind < stamps.size() ? std::optional(log.records[behind].stamp_s) : std::nullopt;
-    if (is_slip(stamp_s, before_s, behind_s)) continue;
-    stamps[index] = stamp_s;
-    before_s = stamp_s;
-  }
-  return stamps;
-}
-
+// Records without a stamp, and those that step back a little, as merged logs have them, are due at
+// once. A stamp far from the one before is a slip of the recorder, the end of a gap or another
+// clock: it is due at once, and followed from there on.
 void pace_by_stamps(RobotLog& log) {
-  const std::vector<double> stamps = followed_stamps(log);
   double due_s = 0.0;
-  double clock_s = 0.0;
-  bool started = false;
-  for (std::size_t index = 0; index < stamps.size(); ++index) {
-    const double stamp_s = stamps[index];
-    if (stamp_s != 0.0) {
-      if (started && stamp_s > clock_s) due_s += std::min(stamp_s - clock_s, kLongestPause_s);
-      // Far back is another clock, to be followed from here on; a little back is a merge that was
-      // not quite in order.
-      const bool other_clock = stamp_s < clock_s - kLongestPause_s;
-      clock_s = started && !other_clock ? std::max(clock_s, stamp_s) : stamp_s;
-      started = true;
+  std::optional<double> clock_s;
+  for (LogRecord& record : log.records) {
+    if (record.stamp_s != 0.0) {
+      const double step_s = record.stamp_s - clock_s.value_or(record.stamp_s);
+      const bool near = std::abs(step_s) <= kLongestPause_s;
+      if (near) due_s += std::max(step_s, 0.0);
+      if (!near || step_s >= 0.0) clock_s = record.stamp_s;
     }
-    log.records[index].due_s = due_s;
+    record.due_s = due_s;
   }
 }
 

@@ -14,12 +14,12 @@ namespace gimnet::demo {
 /// One ODOM or FLASER line of a log in the format of CARMEN
 /// (carmen.sourceforge.net/logger_playback.html).
 struct LogRecord {
-  /// Where the robot was, as its odometry or whoever corrected the log says.
+  /// The robot's place by its odometry, or as the log was corrected.
   Pose pose;
   /// Seconds as logged; 0 where the line has none (a marker behind each scan of corrected logs has
   /// not).
   double stamp_s = 0.0;
-  /// When to play it, in seconds after the first record; ascending. Filled in by pace_log().
+  /// The time to play it, in seconds after the first record; ascending. Filled in by pace_log().
   double due_s = 0.0;
   /// Distances in metres, right to left over half a circle; empty for ODOM.
   std::vector<float> ranges_m;
@@ -27,7 +27,7 @@ struct LogRecord {
   [[nodiscard]] bool is_scan() const { return !ranges_m.empty(); }
 };
 
-/// What a log holds, in its order.
+/// The records of a log, in its order.
 struct RobotLog {
   std::vector<LogRecord> records;
   std::size_t scans = 0;
@@ -50,7 +50,7 @@ inline constexpr std::size_t kLogRecordsMax = 4'000'000;
 /// or 81.91.
 inline constexpr float kLogRangeMax_m = 50.0F;
 
-/// What parse_carmen_line() found.
+/// The kind of a line.
 enum class LineKind : std::uint8_t { kIgnored, kOdometry, kScan };
 
 /// Reads one line. Comments, empty lines and other kinds of messages (PARAM, NEFF, RLASER, ...) are
@@ -63,17 +63,16 @@ enum class LineKind : std::uint8_t { kIgnored, kOdometry, kScan };
 [[nodiscard]] Result<RobotLog> load_robot_log(const std::string& path);
 
 /// Longest pause that a playback keeps, in seconds: longer ones are gaps of the recording, not of
-/// the drive.
+/// the drive, and are left out.
 inline constexpr double kLongestPause_s = 5.0;
-/// How long before the robot first moves or scans a playback begins, in seconds.
+/// A playback begins this long before the robot first moves or scans, in seconds.
 inline constexpr double kLeadIn_s = 1.0;
 /// A shorter standing still at the beginning is played, in seconds.
 inline constexpr double kShortestLeftOut_s = 5.0;
 
-/// Fills in `due_s` of every record and the note. Records keep their order. Stamps that step back,
-/// as merged logs have them, are played at once; the standing still at the beginning is left out.
-/// Where the stamps were rounded until nothing is left of them, the robot's way sets the pace: 0.5
-/// m/s and 0.8 rad/s. REQUIRES: at least one record.
+/// Fills in `due_s` of every record and the note. Records keep their order. The standing still at
+/// the beginning is left out. If the stamps were rounded until nothing is left of them, the robot's
+/// way sets the pace: 0.5 m/s and 0.8 rad/s. REQUIRES: at least one record.
 void pace_log(RobotLog& log);
 
 }  // namespace gimnet::demo

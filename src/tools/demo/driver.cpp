@@ -70,7 +70,7 @@ void Driver::press(Key key, const Monitor& monitor, std::int64_t now_ns) {
   if (key == Key::kAutopilot) autopilot_ = !autopilot_;
   const bool drives = key == Key::kForward || key == Key::kBack || key == Key::kLeft ||
                       key == Key::kRight || key == Key::kStop;
-  // Whoever takes the wheel has it.
+  // A key takes the wheel from the course.
   if (drives) autopilot_ = false;
   teleop_.press(key, now_ns);
 }

@@ -19,7 +19,7 @@ class Course {
  public:
   explicit Course(std::vector<Point> corners) : corners_(std::move(corners)) {}
 
-  /// What to do at that pose. Without corners: stand still.
+  /// The speed at that pose. Without corners: none.
   [[nodiscard]] Twist steer(const Pose& pose);
 
   /// Corners that were reached.

@@ -6,9 +6,30 @@
 #include <numbers>
 #include <string_view>
 
-#include "tools/demo/text_format.hpp"
-
 namespace gimnet::demo {
+
+std::string duration_text(std::optional<std::int64_t> duration_ns) {
+  if (!duration_ns) return "–";
+  const double microseconds = static_cast<double>(*duration_ns) * 1e-3;
+  if (microseconds < 999.5) return fmt::format("{:.0f} µs", microseconds);
+  if (microseconds < 9.995e3) return fmt::format("{:.2f} ms", microseconds * 1e-3);
+  if (microseconds < 99.95e3) return fmt::format("{:.1f} ms", microseconds * 1e-3);
+  if (microseconds < 999.5e3) return fmt::format("{:.0f} ms", microseconds * 1e-3);
+  return fmt::format("{:.2f} s", microseconds * 1e-6);
+}
+
+std::string count_text(std::uint64_t count) {
+  std::string digits = fmt::format("{}", count);
+  for (std::size_t place = digits.size(); place > 3; place -= 3) digits.insert(place - 3, 1, ',');
+  return digits;
+}
+
+std::string clock_text(double seconds) {
+  const auto whole = static_cast<std::uint64_t>(std::clamp(seconds, 0.0, 1e9));
+  if (whole < 3600) return fmt::format("{}:{:02}", whole / 60, whole % 60);
+  return fmt::format("{}:{:02}:{:02}", whole / 3600, whole / 60 % 60, whole % 60);
+}
+
 namespace {
 
 double degrees(double angle_rad) { return angle_rad * 180.0 / std::numbers::pi; }
@@ -105,15 +126,15 @@ void draw_stream_figures(Column& column, const Monitor& monitor, std::int64_t no
 
 void draw_latency_figures(Column& column, const Monitor& monitor) {
   column.heading_over("LATENCY", "p50", "p99");
-  const auto age = [&](std::string_view label, const SampleWindow& window) {
-    column.row(label, duration_text(window.percentile_ns(50)),
-               duration_text(window.percentile_ns(99)));
+  const auto age = [&](std::string_view label, const StreamRecord& record) {
+    column.row(label, duration_text(record.age.percentile_ns(50)),
+               duration_text(record.age.percentile_ns(99)));
   };
-  age("odom", monitor.odometry_age());
-  age("scan", monitor.scan_age());
-  age("loop", monitor.loop_age());
-  column.curve(
-      monitor.odometry_age().latest(static_cast<std::size_t>(column.right() - column.left())));
+  age("odom", monitor.odometry_stream());
+  age("scan", monitor.scan_stream());
+  age("loop", monitor.drive_stream());
+  column.curve(monitor.odometry_stream().age.latest(
+      static_cast<std::size_t>(column.right() - column.left())));
 }
 
 void draw_hub_figures(Column& column, const Monitor& monitor) {
@@ -163,8 +184,8 @@ void draw_strip(Canvas& canvas, const Monitor& monitor, const ScreenState& state
               fmt::format("odom {:.0f} Hz  scan {:.0f} Hz  p50 {}  p99 {}",
                           monitor.odometry_stream().rate.rate_hz(state.now_ns),
                           monitor.scan_stream().rate.rate_hz(state.now_ns),
-                          duration_text(monitor.odometry_age().percentile_ns(50)),
-                          duration_text(monitor.odometry_age().percentile_ns(99))),
+                          duration_text(monitor.odometry_stream().age.percentile_ns(50)),
+                          duration_text(monitor.odometry_stream().age.percentile_ns(99))),
               Ink::kPlain);
   if (!monitor.hub()) return;
   const std::uint64_t dropped = monitor.hub()->dropped();

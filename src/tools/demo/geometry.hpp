@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -11,7 +12,19 @@ struct Point {
   double y_m = 0.0;
 };
 
-/// Where something is and which way it faces: radians, counter-clockwise from the x axis.
+/// A rectangle.
+struct Box {
+  Point least;
+  Point most;
+
+  /// The smallest rectangle that holds this one and the point.
+  [[nodiscard]] Box widened(const Point& point) const {
+    return {{std::min(least.x_m, point.x_m), std::min(least.y_m, point.y_m)},
+            {std::max(most.x_m, point.x_m), std::max(most.y_m, point.y_m)}};
+  }
+};
+
+/// A place and the direction in which something faces: radians, counter-clockwise from the x axis.
 struct Pose {
   double x_m = 0.0;
   double y_m = 0.0;

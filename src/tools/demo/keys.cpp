@@ -32,7 +32,7 @@ std::optional<Key> key_in(std::span<const Meaning> meanings, char byte) {
   return std::nullopt;
 }
 
-// What a text that begins with Esc begins with. Its end may be still to come: size 0.
+// The sequence at the front of a text that begins with Esc. Size 0: its end is still to come.
 struct Sequence {
   std::size_t size = 0;
   bool whole = false;

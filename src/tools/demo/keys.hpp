@@ -9,7 +9,7 @@
 
 namespace gimnet::demo {
 
-/// What the demo understands of a keyboard.
+/// The keys that the demo understands.
 enum class Key : std::uint8_t {
   kForward,
   kBack,
@@ -39,8 +39,8 @@ class KeyParser {
   /// types that fast.
   static constexpr std::int64_t kSequencePatience_ns = 100'000'000;
 
-  /// What came since the last call, also nothing: that is how it learns that no more of a sequence
-  /// comes. Times are of any clock that does not go back.
+  /// Takes the bytes since the last call. Call it without bytes too: so it learns that no more of a
+  /// sequence comes. Times are of any clock that does not go back.
   [[nodiscard]] std::vector<Key> take(std::string_view bytes, std::int64_t now_ns);
 
  private:
@@ -62,7 +62,7 @@ class Teleop {
   /// Takes a key; others than W A S D and space are not its business.
   void press(Key key, std::int64_t now_ns);
 
-  /// What is wanted at that time.
+  /// The wanted speed at that time.
   [[nodiscard]] Twist twist(std::int64_t now_ns) const;
 
  private:

@@ -12,7 +12,9 @@ namespace gimnet::demo {
 void LineReader::Closer::operator()(gzFile_s* file) const { (void)gzclose(file); }
 
 LineReader::LineReader(std::string path, gzFile_s* file)
-    : path_(std::move(path)), file_(file), buffer_(1U << 16) {}
+    : path_(std::move(path)), file_(file), buffer_(kLineBytesMax + 1, '\0') {
+  (void)gzbuffer(file, 1U << 16);
+}
 
 Result<LineReader> LineReader::open(const std::string& path) {
   struct stat status{};
@@ -31,72 +33,34 @@ Result<LineReader> LineReader::open(const std::string& path) {
   return LineReader(path, file);
 }
 
-Error LineReader::failure(std::string_view what) const {
-  return Error{fmt::format("{}:{}: {}", path_, line_number_ + 1, what)};
-}
-
-// Moves what is left to the front, doubles the buffer where a line fills it, and reads. False:
-// nothing more came.
-Result<bool> LineReader::fill() {
-  std::memmove(buffer_.data(), buffer_.data() + begin_, end_ - begin_);
-  end_ -= begin_;
-  begin_ = 0;
-  if (end_ == buffer_.size()) buffer_.resize(buffer_.size() * 2);
-  const int got =
-      gzread(file_.get(), buffer_.data() + end_, static_cast<unsigned>(buffer_.size() - end_));
-  if (got <= 0) {
-    int code = Z_OK;
-    const char* text = gzerror(file_.get(), &code);
-    // zlib tells of an archive that was cut only by this code, after it has given what it could
-    // read.
-    if (code == Z_BUF_ERROR) {
-      is_cut_ = true;
-      return false;
-    }
-    if (got < 0)
-      return failure(fmt::format("damaged gzip archive ({}); copy the file again", text));
-    return false;
-  }
-  end_ += static_cast<std::size_t>(got);
-  bytes_read_ += static_cast<std::uint64_t>(got);
-  if (bytes_read_ > kFileBytesMax) return failure("the file holds more than 1 GiB of text; cut it");
-  return true;
-}
-
 Result<bool> LineReader::next(std::string_view& line) {
-  std::size_t searched = begin_;
   is_too_long_ = false;
   while (true) {
-    const void* found = std::memchr(buffer_.data() + searched, '\n', end_ - searched);
-    if (found != nullptr || (at_end_ && (begin_ < end_ || is_too_long_))) {
-      const std::size_t stop =
-          found == nullptr
-              ? end_
-              : static_cast<std::size_t>(static_cast<const char*>(found) - buffer_.data());
-      line = std::string_view(buffer_.data() + begin_, stop - begin_);
-      if (is_too_long_) line = {};
-      if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
-      begin_ = found == nullptr ? end_ : stop + 1;
-      ++line_number_;
-      return true;
-    }
-    if (at_end_) return false;
-    if (end_ - begin_ >= kLineBytesMax) {
+    const std::int64_t before = gztell(file_.get());
+    const char* got = gzgets(file_.get(), buffer_.data(), static_cast<int>(buffer_.size()));
+    const auto size = static_cast<std::size_t>(gztell(file_.get()) - before);
+    int code = Z_OK;
+    const char* text = gzerror(file_.get(), &code);
+    const auto failure = [&](std::string_view what) {
+      return Error{fmt::format("{}:{}: {}", path_, line_number_ + 1, what)};
+    };
+    if (code != Z_OK && code != Z_BUF_ERROR)
+      return failure(fmt::format("damaged gzip archive ({}); copy the file again", text));
+    if (before > kFileBytesMax) return failure("the file holds more than 1 GiB of text; cut it");
+    const bool whole = got != nullptr && buffer_[size - 1] == '\n';
+    // zlib tells by this code that the archive was cut; its last line is a part of a line.
+    is_cut_ = code == Z_BUF_ERROR;
+    if (is_cut_ && !whole) return false;
+    if (got == nullptr && !is_too_long_) return false;
+    if (got != nullptr && size == buffer_.size() - 1 && !whole) {
       is_too_long_ = true;
-      begin_ = end_;
+      continue;
     }
-    searched = end_ - begin_;
-    const Result<bool> more = fill();
-    if (!more) return more.error();
-    if (!*more) {
-      at_end_ = true;
-      // The last line of a cut archive is a part of a line.
-      if (is_cut_) {
-        begin_ = end_;
-        is_too_long_ = false;
-      }
-      searched = begin_;
-    }
+    ++line_number_;
+    line = is_too_long_ ? std::string_view() : std::string_view(buffer_.data());
+    if (line.ends_with('\n')) line.remove_suffix(1);
+    if (line.ends_with('\r')) line.remove_suffix(1);
+    return true;
   }
 }
 

@@ -5,7 +5,6 @@
 #include <memory>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "base/result.hpp"
 
@@ -20,15 +19,16 @@ namespace gimnet::demo {
 class LineReader {
  public:
   static constexpr std::size_t kLineBytesMax = 1U << 20;
-  static constexpr std::uint64_t kFileBytesMax = 1ULL << 30;
+  static constexpr std::int64_t kFileBytesMax = 1LL << 30;
 
   /// Errors: no such file, not a regular file, not readable.
   static Result<LineReader> open(const std::string& path);
 
   /// Stores the next line without its end in `line`; false at the end of the file.
   /// A line beyond kLineBytesMax is given empty, with is_too_long(). A cut archive ends after its
-  /// last whole line, with is_cut(). Errors: damaged archive, `kFileBytesMax` passed; the sentence
-  /// names file and line. Valid until: the next call.
+  /// last whole line, with is_cut(). Of a line that holds a NUL only what stands before it is
+  /// given. Errors: damaged archive, `kFileBytesMax` passed; the sentence names file and line.
+  /// Valid until: the next call.
   [[nodiscard]] Result<bool> next(std::string_view& line);
 
   /// Number of the line that next() gave last, from 1.
@@ -37,7 +37,6 @@ class LineReader {
   [[nodiscard]] bool is_too_long() const { return is_too_long_; }
   /// The gzip archive ended too early.
   [[nodiscard]] bool is_cut() const { return is_cut_; }
-  [[nodiscard]] const std::string& path() const { return path_; }
 
  private:
   struct Closer {
@@ -45,17 +44,11 @@ class LineReader {
   };
 
   LineReader(std::string path, gzFile_s* file);
-  [[nodiscard]] Result<bool> fill();
-  [[nodiscard]] Error failure(std::string_view what) const;
 
   std::string path_;
   std::unique_ptr<gzFile_s, Closer> file_;
-  std::vector<char> buffer_;
-  std::size_t begin_ = 0;
-  std::size_t end_ = 0;
+  std::string buffer_;
   std::uint64_t line_number_ = 0;
-  std::uint64_t bytes_read_ = 0;
-  bool at_end_ = false;
   bool is_too_long_ = false;
   bool is_cut_ = false;
 };

@@ -46,10 +46,9 @@ Twist LogPlayer::twist_at(const LogRecord& record) {
           normalized_angle(record.pose.heading_rad - before.pose.heading_rad) / dt_s};
 }
 
-void LogPlayer::say(const LogRecord& record, std::int64_t now_ns, const Output& output) {
+void LogPlayer::say(const LogRecord& record, const Output& output) {
   if (!record.is_scan()) {
     Odometry odometry;
-    odometry.stamp = {++odometry_total_, now_ns};
     odometry.pose = record.pose;
     odometry.twist = twist_at(record);
     odometry.answers = answers_;
@@ -57,7 +56,6 @@ void LogPlayer::say(const LogRecord& record, std::int64_t now_ns, const Output& 
     return;
   }
   Scan scan;
-  scan.stamp = {++scan_total_, now_ns};
   scan.pose = record.pose;
   // n beams over half a circle: 180 are half a degree off centre each way, 181 and 361 reach both
   // ends.
@@ -67,13 +65,13 @@ void LogPlayer::say(const LogRecord& record, std::int64_t now_ns, const Output& 
   scan.first_bearing_rad = -scan.bearing_step_rad * (beams - 1.0) / 2.0;
   scan.range_max_m = static_cast<double>(kLogRangeMax_m);
   scan.ranges_m = record.ranges_m;
-  output.on_scan(scan);
+  output.on_scan(std::move(scan));
 }
 
 void LogPlayer::advance(std::int64_t now_ns, const Output& output) {
   let_time_pass(now_ns);
   for (; next_ < log_.records.size() && log_.records[next_].due_s <= played_s_; ++next_) {
-    say(log_.records[next_], now_ns, output);
+    say(log_.records[next_], output);
   }
 }
 

@@ -17,7 +17,7 @@ inline constexpr double kPlaySpeedMax = 100.0;
 /// more.
 class LogPlayer final : public RobotSource {
  public:
-  /// How a playback begins. `speed` is within kPlaySpeedMin .. kPlaySpeedMax.
+  /// The beginning of a playback. `speed` is within kPlaySpeedMin .. kPlaySpeedMax.
   struct Start {
     std::string source;
     double speed = 1.0;
@@ -33,7 +33,7 @@ class LogPlayer final : public RobotSource {
 
  private:
   void let_time_pass(std::int64_t now_ns);
-  void say(const LogRecord& record, std::int64_t now_ns, const Output& output);
+  void say(const LogRecord& record, const Output& output);
   [[nodiscard]] Twist twist_at(const LogRecord& record);
 
   RobotLog log_;
@@ -45,8 +45,6 @@ class LogPlayer final : public RobotSource {
   std::size_t next_ = 0;
   std::size_t twist_from_ = 0;
   Stamp answers_;
-  std::uint64_t odometry_total_ = 0;
-  std::uint64_t scan_total_ = 0;
 };
 
 }  // namespace gimnet::demo

@@ -62,7 +62,7 @@ Result<Robot::SourceMaker> source_maker(const DemoOptions& options) {
   });
 }
 
-// What the screen can show: the choice of the user, then the environment, then the terminal itself.
+// The style of the screen: by choice of the user, then the environment, then the terminal itself.
 TerminalStyle style_for(const DemoOptions& options, Terminal* terminal) {
   TerminalStyle style;
   style.colours = terminal == nullptr ? ColourDepth::kNone : colours_of_environment();
@@ -112,7 +112,7 @@ ExitCode run_robot(const DemoOptions& options) {
     complain(port.error());
     return ExitCode::kNoNetwork;
   }
-  // Who reads it goes on without it, or does not: the robot is there.
+  // The robot runs whether the line could be written or not.
   (void)show("ready\n");
   Robot robot(**port, std::move(*maker));
   while (stop_signal() == 0) {

@@ -40,57 +40,45 @@ class Decoder {
   explicit Decoder(std::span<const std::byte> bytes) : reader_(bytes) {}
 
   void operator()(std::string_view key, double& out) {
-    const std::optional<Value> value = take(key);
-    const std::optional<double> number = value ? value->as<double>() : std::nullopt;
-    keep(number && std::isfinite(*number) && std::abs(*number) <= kPlausible, number, out);
+    take(key, out, [](const Value& value) { return value.as<double>(); });
+    good_ = good_ && std::isfinite(out) && std::abs(out) <= kPlausible;
   }
   void operator()(std::string_view key, std::uint64_t& out) {
-    const std::optional<Value> value = take(key);
-    const std::optional<std::uint64_t> number = value ? value->as<std::uint64_t>() : std::nullopt;
-    keep(number.has_value(), number, out);
+    take(key, out, [](const Value& value) { return value.as<std::uint64_t>(); });
   }
   void operator()(std::string_view key, bool& out) {
-    const std::optional<Value> value = take(key);
-    const std::optional<bool> flag = value ? value->as_bool() : std::nullopt;
-    keep(flag.has_value(), flag, out);
+    take(key, out, [](const Value& value) { return value.as_bool(); });
   }
   // A text that is empty is left out by writers.
   void operator()(std::string_view key, std::string& out) {
-    const std::optional<Value> value = reader_.find(key);
-    if (!value) return;
-    const std::optional<std::string_view> text = value->as_text();
-    keep(text && text->size() <= kInfoTextMax, text, out);
+    if (!reader_.find(key)) return;
+    take(key, out, [](const Value& value) { return value.as_text(); });
+    good_ = good_ && out.size() <= kInfoTextMax;
   }
   void operator()(std::string_view key, std::vector<float>& out) {
-    const std::optional<Value> value = take(key);
+    const std::optional<Value> value = reader_.find(key);
     good_ =
         good_ && value && value->type() == BITESTREAM_F32_ARRAY && value->count() <= kScanBeamsMax;
-    if (!good_) return;
-    out.reserve(value->count());
-    for (std::size_t index = 0; index < value->count(); ++index) {
+    for (std::size_t index = 0; good_ && index < value->count(); ++index) {
       const std::optional<Value> element = value->element(index);
-      const std::optional<float> number = element ? element->as<float>() : std::nullopt;
-      good_ = good_ && number && std::isfinite(*number) && *number >= 0.0F;
-      out.push_back(number.value_or(0.0F));
+      const float range = element ? element->as<float>().value_or(-1.0F) : -1.0F;
+      good_ = std::isfinite(range) && range >= 0.0F;
+      out.push_back(range);
     }
   }
   void time(std::string_view key, std::int64_t& out) {
-    const std::optional<Value> value = take(key);
-    const std::optional<std::int64_t> time = value ? value->as_time() : std::nullopt;
-    keep(time.has_value(), time, out);
+    take(key, out, [](const Value& value) { return value.as_time(); });
   }
 
   [[nodiscard]] bool good() const { return good_; }
 
  private:
-  std::optional<Value> take(std::string_view key) {
-    return good_ ? reader_.find(key) : std::nullopt;
-  }
-
-  template <class From, class To>
-  void keep(bool fits, const std::optional<From>& from, To& to) {
-    good_ = good_ && fits;
-    if (good_) to = To(*from);
+  template <class To, class Read>
+  void take(std::string_view key, To& to, const Read& read) {
+    const std::optional<Value> value = good_ ? reader_.find(key) : std::nullopt;
+    const auto from = value ? read(*value) : std::nullopt;
+    good_ = from.has_value();
+    if (from) to = To(*from);
   }
 
   Reader reader_;
@@ -154,37 +142,30 @@ void fields(auto& visit, auto& message, std::type_identity<DriveCommand>) {
   visit("finish", message.finish);
 }
 
+}  // namespace
+
 template <class Message>
-Bytes encoded(const Message& message) {
+Bytes encode(const Message& message) {
   Encoder encoder;
   fields(encoder, message, std::type_identity<Message>{});
   return encoder.bytes();
 }
 
 template <class Message>
-std::optional<Message> decoded(std::span<const std::byte> bytes) {
+std::optional<Message> decode(std::span<const std::byte> bytes) {
   Decoder decoder(bytes);
   Message message;
   fields(decoder, message, std::type_identity<Message>{});
   return decoder.good() ? std::optional(std::move(message)) : std::nullopt;
 }
 
-}  // namespace
-
-Bytes encode(const Odometry& message) { return encoded(message); }
-Bytes encode(const Scan& message) { return encoded(message); }
-Bytes encode(const RobotInfo& message) { return encoded(message); }
-Bytes encode(const DriveCommand& message) { return encoded(message); }
-
-std::optional<Odometry> decode_odometry(std::span<const std::byte> bytes) {
-  return decoded<Odometry>(bytes);
-}
-std::optional<Scan> decode_scan(std::span<const std::byte> bytes) { return decoded<Scan>(bytes); }
-std::optional<RobotInfo> decode_info(std::span<const std::byte> bytes) {
-  return decoded<RobotInfo>(bytes);
-}
-std::optional<DriveCommand> decode_drive(std::span<const std::byte> bytes) {
-  return decoded<DriveCommand>(bytes);
-}
+template Bytes encode(const Odometry&);
+template Bytes encode(const Scan&);
+template Bytes encode(const RobotInfo&);
+template Bytes encode(const DriveCommand&);
+template std::optional<Odometry> decode(std::span<const std::byte>);
+template std::optional<Scan> decode(std::span<const std::byte>);
+template std::optional<RobotInfo> decode(std::span<const std::byte>);
+template std::optional<DriveCommand> decode(std::span<const std::byte>);
 
 }  // namespace gimnet::demo

@@ -11,7 +11,7 @@
 
 namespace gimnet::demo {
 
-// What the robot and its driver tell each other: Bitestream with text keys, so that any tool can
+// The messages between the robot and its driver: Bitestream with text keys, so that any tool can
 // print them.
 //
 //     robot/odom   provided by the robot, 40 a second   Odometry
@@ -21,7 +21,7 @@ namespace gimnet::demo {
 //
 // Every message has a number, counted from 1 per service and sender, so that each end can tell what
 // it missed, and the time at which it was made, so that the other can tell how old it is. Thread
-// safety: pure functions. Errors: decode_...() gives nothing for bytes that are not such a message.
+// safety: pure functions. Errors: decode() gives nothing for bytes that are not such a message.
 // Limits: `kScanBeamsMax` beams, `kInfoTextMax` bytes of map text.
 
 inline constexpr std::size_t kScanBeamsMax = 4096;
@@ -53,9 +53,22 @@ struct Scan {
   /// A distance from here on means that the beam met nothing.
   double range_max_m = 0.0;
   std::vector<float> ranges_m;
+
+  [[nodiscard]] Ray ray(std::size_t beam) const {
+    return {position(pose),
+            pose.heading_rad + first_bearing_rad + bearing_step_rad * static_cast<double>(beam)};
+  }
+  /// REQUIRES: beam < ranges_m.size().
+  [[nodiscard]] bool hit(std::size_t beam) const {
+    return static_cast<double>(ranges_m[beam]) < range_max_m;
+  }
+  /// The place at which a beam ended. REQUIRES: beam < ranges_m.size().
+  [[nodiscard]] Point end_of(std::size_t beam) const {
+    return point_along(ray(beam), static_cast<double>(ranges_m[beam]));
+  }
 };
 
-/// What the robot is, and how much it has said: the totals let a reader tell that it has
+/// A description of the robot, and the totals of its messages: they let a reader tell that it has
 /// everything. Keys: n, t, source, note, map, played, duration, speed, paused, ended, odom_total,
 /// scan_total, drive_total.
 struct RobotInfo {
@@ -80,7 +93,7 @@ struct RobotInfo {
   [[nodiscard]] bool is_log() const { return map.empty(); }
 };
 
-/// What the driver wants. Keys: n, t, v, w, speed, paused, finish.
+/// The driver's wish. Keys: n, t, v, w, speed, paused, finish.
 struct DriveCommand {
   Stamp stamp;
   Twist twist;
@@ -93,14 +106,10 @@ struct DriveCommand {
 
 using Bytes = std::vector<std::byte>;
 
-[[nodiscard]] Bytes encode(const Odometry& message);
-[[nodiscard]] Bytes encode(const Scan& message);
-[[nodiscard]] Bytes encode(const RobotInfo& message);
-[[nodiscard]] Bytes encode(const DriveCommand& message);
-
-[[nodiscard]] std::optional<Odometry> decode_odometry(std::span<const std::byte> bytes);
-[[nodiscard]] std::optional<Scan> decode_scan(std::span<const std::byte> bytes);
-[[nodiscard]] std::optional<RobotInfo> decode_info(std::span<const std::byte> bytes);
-[[nodiscard]] std::optional<DriveCommand> decode_drive(std::span<const std::byte> bytes);
+/// Message: Odometry, Scan, RobotInfo or DriveCommand.
+template <class Message>
+[[nodiscard]] Bytes encode(const Message& message);
+template <class Message>
+[[nodiscard]] std::optional<Message> decode(std::span<const std::byte> bytes);
 
 }  // namespace gimnet::demo

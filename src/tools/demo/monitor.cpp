@@ -71,20 +71,19 @@ void Monitor::extend_trail(const Pose& pose) {
   if (!trail_.empty() && distance_m(trail_.back(), here) < kTrailStep_m) return;
   if (!trail_.empty()) way_m_ += distance_m(trail_.back(), here);
   if (trail_.size() >= kTrailPointsMax) {
-    std::vector<Point> thinned;
-    thinned.reserve(trail_.size() / 2 + 1);
-    for (std::size_t index = 0; index < trail_.size(); index += 2) thinned.push_back(trail_[index]);
-    trail_ = std::move(thinned);
+    for (std::size_t index = 0; index < trail_.size() / 2; ++index)
+      trail_[index] = trail_[2 * index];
+    trail_.resize(trail_.size() / 2);
   }
   trail_.push_back(here);
 }
 
 void Monitor::take(const Odometry& message, std::int64_t now_ns) {
   odometry_stream_.take(message.stamp.number, now_ns);
-  odometry_age_.add(now_ns - message.stamp.made_ns);
+  odometry_stream_.age.add(now_ns - message.stamp.made_ns);
   if (message.answers.number > answered_) {
     answered_ = message.answers.number;
-    loop_age_.add(now_ns - message.answers.made_ns);
+    drive_stream_.age.add(now_ns - message.answers.made_ns);
   }
   extend_trail(message.pose);
   odometry_ = message;
@@ -92,9 +91,8 @@ void Monitor::take(const Odometry& message, std::int64_t now_ns) {
 
 void Monitor::take(const Scan& message, std::int64_t now_ns) {
   scan_stream_.take(message.stamp.number, now_ns);
-  scan_age_.add(now_ns - message.stamp.made_ns);
-  scan_ = PlacedScan{message.pose, message.first_bearing_rad, message.bearing_step_rad,
-                     message.range_max_m, message.ranges_m};
+  scan_stream_.age.add(now_ns - message.stamp.made_ns);
+  scan_ = message;
   seen_.add(*scan_);
 }
 

@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "tools/demo/hub_counters.hpp"
 #include "tools/demo/messages.hpp"
+#include "tools/demo/node_port.hpp"
 #include "tools/demo/occupancy_map.hpp"
 #include "tools/demo/world_map.hpp"
 
@@ -48,12 +48,15 @@ class RateMeter {
   std::optional<std::int64_t> first_ns_;
 };
 
-/// What is known about one stream of numbered messages.
+/// The record of one stream of numbered messages.
 struct StreamRecord {
   RateMeter rate;
+  /// Ages of messages on arrival; of commands: until the first odometry that follows them.
+  SampleWindow age{2000};
   std::uint64_t received = 0;
-  /// Numbers that were skipped. What comes twice or out of order counts in `disordered`.
+  /// Numbers that were skipped.
   std::uint64_t missed = 0;
+  /// Messages that came twice or out of order.
   std::uint64_t disordered = 0;
   std::uint64_t last_number = 0;
   /// The sender began before: the first number may be any.
@@ -69,8 +72,7 @@ class Monitor {
   static constexpr std::size_t kTrailPointsMax = 20'000;
   static constexpr double kTrailStep_m = 0.04;
 
-  /// `joined_late`: the robot may have begun before, so what came before the first message is not
-  /// missed.
+  /// `joined_late`: the robot may have begun before, so messages before the first are not missed.
   explicit Monitor(std::int64_t start_ns, bool joined_late = false) : start_ns_(start_ns) {
     odometry_stream_.joined_late = scan_stream_.joined_late = joined_late;
   }
@@ -86,8 +88,8 @@ class Monitor {
 
   [[nodiscard]] std::int64_t start_ns() const { return start_ns_; }
   [[nodiscard]] const std::optional<Odometry>& odometry() const { return odometry_; }
-  [[nodiscard]] const std::optional<PlacedScan>& scan() const { return scan_; }
-  /// Where the robot is, by its odometry; by its last scan, if it has none: a log may hold only one
+  [[nodiscard]] const std::optional<Scan>& scan() const { return scan_; }
+  /// The robot's place by its odometry; by its last scan, if it has none: a log may hold only one
   /// of them.
   [[nodiscard]] std::optional<Pose> pose() const;
   [[nodiscard]] const std::optional<RobotInfo>& info() const { return info_; }
@@ -100,10 +102,6 @@ class Monitor {
   [[nodiscard]] const StreamRecord& odometry_stream() const { return odometry_stream_; }
   [[nodiscard]] const StreamRecord& scan_stream() const { return scan_stream_; }
   [[nodiscard]] const StreamRecord& drive_stream() const { return drive_stream_; }
-  [[nodiscard]] const SampleWindow& odometry_age() const { return odometry_age_; }
-  [[nodiscard]] const SampleWindow& scan_age() const { return scan_age_; }
-  /// From a command's sending to the first odometry that follows it.
-  [[nodiscard]] const SampleWindow& loop_age() const { return loop_age_; }
   [[nodiscard]] std::uint64_t garbled_messages() const { return garbled_; }
   /// Metres driven.
   [[nodiscard]] double way_m() const { return way_m_; }
@@ -113,7 +111,7 @@ class Monitor {
 
   std::int64_t start_ns_;
   std::optional<Odometry> odometry_;
-  std::optional<PlacedScan> scan_;
+  std::optional<Scan> scan_;
   std::optional<RobotInfo> info_;
   std::optional<HubCounters> hub_;
   std::optional<WorldMap> plan_;
@@ -122,9 +120,6 @@ class Monitor {
   StreamRecord odometry_stream_;
   StreamRecord scan_stream_;
   StreamRecord drive_stream_;
-  SampleWindow odometry_age_{2000};
-  SampleWindow scan_age_{500};
-  SampleWindow loop_age_{500};
   std::uint64_t answered_ = 0;
   std::uint64_t garbled_ = 0;
   double way_m_ = 0.0;

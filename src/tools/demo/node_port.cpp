@@ -42,7 +42,7 @@ bool is_final(const Failure& failure) {
   return failure.status != Status::timeout && failure.status != Status::not_connected;
 }
 
-// What both ends have in common.
+// The common part of both ends.
 class GimiPort : public NodePort {
  public:
   explicit GimiPort(Node node) : node_(std::move(node)) {}
@@ -152,7 +152,7 @@ class ViewerPort final : public GimiPort {
     return Error{"a viewer publishes nothing"};
   }
 
-  // The robot is there: only who has heard it commands it.
+  // The robot is there: it was heard before.
   std::optional<Error> command(std::span<const std::byte> payload) override {
     if (!drive_) {
       SendOptions options;

@@ -2,15 +2,15 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
-#include <vector>
+#include <string_view>
 
 #include "base/clock.hpp"
 #include "base/result.hpp"
-#include "tools/demo/hub_counters.hpp"
 #include "tools/demo/messages.hpp"
 
 namespace gimnet::demo {
@@ -18,7 +18,37 @@ namespace gimnet::demo {
 /// The four services of the demo (messages.hpp).
 enum class Service : std::uint8_t { kOdometry, kScan, kInfo, kDrive };
 
-/// What robot and viewer need of the network: a seam, so that tests put two ends together without a
+/// The counters of the hub's ledger (docs/protocol.md, section 9), summed over its shards. Thread
+/// safety: one thread.
+struct HubCounters {
+  std::uint64_t accepted = 0;
+  std::uint64_t copies = 0;
+  std::uint64_t delivered = 0;
+  std::uint64_t queued = 0;
+  /// Reasons with at least one frame, and its frames.
+  std::map<std::string, std::uint64_t> drops;
+
+  /// Adds one counter of one shard, by its name in docs/operations.md; others than the ledger's are
+  /// passed over.
+  void add(std::string_view name, std::uint64_t value) {
+    constexpr std::string_view kDropped = "dropped.";
+    if (name == "accepted") accepted += value;
+    if (name == "copies") copies += value;
+    if (name == "delivered") delivered += value;
+    if (name == "queued") queued += value;
+    if (!name.starts_with(kDropped) || value == 0) return;
+    drops[std::string(name.substr(kDropped.size()))] += value;
+  }
+  [[nodiscard]] std::uint64_t dropped() const {
+    std::uint64_t sum = 0;
+    for (const auto& [reason, frames] : drops) sum += frames;
+    return sum;
+  }
+  /// Is accepted + copies = delivered + dropped + queued? Holds exactly whenever nothing moves.
+  [[nodiscard]] bool exact() const { return accepted + copies == delivered + dropped() + queued; }
+};
+
+/// The network as robot and viewer need it: a seam, so that tests put two ends together without a
 /// hub. Thread safety: one thread. Ownership: of its connection, which ends with it.
 class NodePort {
  public:
@@ -53,11 +83,11 @@ class NodePort {
   /// Does the connection to the hub stand?
   [[nodiscard]] virtual bool connected() const = 0;
 
-  /// What the hub counted so far; nothing if it does not answer in time.
+  /// The hub's counters so far; nothing if it does not answer in time.
   [[nodiscard]] virtual std::optional<HubCounters> hub_counters() = 0;
 };
 
-/// Where to connect, and as whom.
+/// The hub to connect to, and the robot's name.
 struct PortOptions {
   /// Empty: GIMNET_HUB, or the hub's usual places.
   std::string hub_url;

@@ -36,29 +36,38 @@ Starts a hub of its own, and the robot as a separate process. For your own hub, 
 NO_COLOR turns colours off. While it runs, ? shows the keys.
 )";
 
+// The roles in which an argument means something.
+enum : unsigned { kInAll = 1, kInRobot = 2, kInView = 4, kEverywhere = 7 };
+
 struct Argument {
   std::string_view name;
   bool takes_value;
+  unsigned roles;
 };
 constexpr Argument kArguments[] = {
-    {"--log", true},   {"--map", true},    {"--speed", true}, {"--seconds", true}, {"--hub", true},
-    {"--robot", true}, {"--ascii", false}, {"--utf8", false}, {"--help", false},   {"-h", false}};
+    {"--log", true, kInAll | kInRobot},   {"--map", true, kInAll | kInRobot},
+    {"--speed", true, kInAll | kInRobot}, {"--seconds", true, kInAll | kInView},
+    {"--hub", true, kInRobot | kInView},  {"--robot", true, kEverywhere},
+    {"--ascii", false, kInAll | kInView}, {"--utf8", false, kInAll | kInView},
+    {"--help", false, kEverywhere},       {"-h", false, kEverywhere}};
 
-struct Bounds {
-  double least;
-  double most;
-};
-
-Result<double> number_of(std::string_view name, std::string_view text, const Bounds& bounds) {
+std::optional<Error> read_number(auto& out, std::string_view name, std::string_view text,
+                                 double least, double most) {
   double value = 0.0;
   const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value);
-  // The comparison is false for what is no number, too.
-  const bool within = value >= bounds.least && value <= bounds.most;
-  if (code != std::errc{} || end != text.data() + text.size() || !within) {
-    return Error{fmt::format("{} takes a number from {} to {}, not '{}'", name, bounds.least,
-                             bounds.most, text)};
-  }
-  return value;
+  // The comparison is false for NaN, too.
+  const bool within = value >= least && value <= most;
+  if (code != std::errc{} || end != text.data() + text.size() || !within)
+    return Error{fmt::format("{} takes a number from {} to {}, not '{}'", name, least, most, text)};
+  out = value;
+  return std::nullopt;
+}
+
+std::optional<Error> read_text(std::string& out, std::string_view name, std::string_view text) {
+  if (text.empty())
+    return Error{fmt::format("{} is empty; give it a value, or leave it out", name)};
+  out = text;
+  return std::nullopt;
 }
 
 // With a '/' and the name of a service it is to be within the 255 bytes of a full name.
@@ -75,66 +84,49 @@ bool is_node_name(std::string_view name) {
 }
 
 std::optional<Error> apply(DemoOptions& options, std::string_view name, std::string_view value) {
-  if (name == "--log") options.log = value;
-  if (name == "--map") options.map = value;
-  if (name == "--hub") options.hub_url = value;
+  if (name == "--log") return read_text(options.log, name, value);
+  if (name == "--map") return read_text(options.map, name, value);
+  if (name == "--hub") return read_text(options.hub_url, name, value);
+  if (name == "--speed")
+    return read_number(options.speed, name, value, kPlaySpeedMin, kPlaySpeedMax);
+  if (name == "--seconds")
+    return read_number(options.seconds, name, value, 0.1, DemoOptions::kSecondsMax);
   if (name == "--ascii") options.glyphs = Glyphs::kAscii;
   if (name == "--utf8") options.glyphs = Glyphs::kUtf8;
   if (name == "--help" || name == "-h") options.help = true;
-  if (name == "--robot") {
-    if (!is_node_name(value)) {
-      return Error{fmt::format(
-          "--robot takes a name of letters, digits, '.', '_' and '-', not '{}'", value)};
-    }
-    options.robot = value;
+  if (name != "--robot") return std::nullopt;
+  if (!is_node_name(value)) {
+    return Error{
+        fmt::format("--robot takes a name of letters, digits, '.', '_' and '-', not '{}'", value)};
   }
-  if (name == "--speed") {
-    const Result<double> number = number_of(name, value, {kPlaySpeedMin, kPlaySpeedMax});
-    if (!number) return number.error();
-    options.speed = *number;
-  }
-  if (name == "--seconds") {
-    const Result<double> number = number_of(name, value, {0.1, DemoOptions::kSecondsMax});
-    if (!number) return number.error();
-    options.seconds = *number;
-  }
+  options.robot = value;
   return std::nullopt;
 }
 
-std::optional<Error> contradiction(const DemoOptions& options,
-                                   const std::vector<std::string_view>& given) {
+std::optional<Error> misplaced(const Argument& argument, Role role) {
+  constexpr unsigned kRoles[] = {kInAll, kInRobot, kInView};
+  if ((argument.roles & kRoles[static_cast<std::size_t>(role)]) != 0) return std::nullopt;
+  if (role == Role::kAll) {
+    return Error{
+        fmt::format("{} is for one part of the demo: say 'robot' or 'view' first, or leave it out",
+                    argument.name)};
+  }
+  return Error{
+      role == Role::kView
+          ? fmt::format("{} is the robot's; give it to 'gimnet-demo robot'", argument.name)
+          : fmt::format("{} is the viewer's; give it to 'gimnet-demo view'", argument.name)};
+}
+
+std::optional<Error> contradiction(const std::vector<std::string_view>& given) {
   const auto has = [&](std::string_view name) {
     return std::find(given.begin(), given.end(), name) != given.end();
   };
-  if (has("--log") && has("--map")) {
+  if (has("--log") && has("--map"))
     return Error{"--log and --map exclude each other: a log brings its own world; leave one out"};
-  }
   if (has("--speed") && !has("--log"))
     return Error{"--speed is the speed of a log; add --log FILE, or leave it out"};
   if (has("--ascii") && has("--utf8"))
     return Error{"--ascii and --utf8 exclude each other; leave one out"};
-  if (options.role == Role::kAll && has("--hub")) {
-    return Error{"--hub is for one part of the demo: say 'robot' or 'view' first, or leave it out"};
-  }
-  if (options.role == Role::kView) {
-    for (const std::string_view name : {"--log", "--map", "--speed"}) {
-      if (has(name))
-        return Error{fmt::format("{} is the robot's; give it to 'gimnet-demo robot'", name)};
-    }
-  }
-  if (options.role == Role::kRobot) {
-    for (const std::string_view name : {"--seconds", "--ascii", "--utf8"}) {
-      if (has(name))
-        return Error{fmt::format("{} is the viewer's; give it to 'gimnet-demo view'", name)};
-    }
-  }
-  for (const std::string_view name : {"--log", "--map", "--hub"}) {
-    const std::string& value = name == "--log"   ? options.log
-                               : name == "--map" ? options.map
-                                                 : options.hub_url;
-    if (has(name) && value.empty())
-      return Error{fmt::format("{} is empty; give it a value, or leave it out", name)};
-  }
   return std::nullopt;
 }
 
@@ -177,10 +169,11 @@ Result<DemoOptions> parse_options(std::span<const char* const> arguments) {
         return Error{fmt::format("{} needs a value behind it", name)};
       value = arguments[index];
     }
+    if (const std::optional<Error> error = misplaced(*known, options.role)) return *error;
     if (const std::optional<Error> error = apply(options, name, value)) return *error;
     if (options.help) return options;
   }
-  if (const std::optional<Error> error = contradiction(options, given)) return *error;
+  if (const std::optional<Error> error = contradiction(given)) return *error;
   return options;
 }
 

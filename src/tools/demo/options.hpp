@@ -13,13 +13,13 @@ namespace gimnet::demo {
 /// Exit codes of the demo.
 enum class ExitCode : std::uint8_t { kGood = 0, kLost = 1, kUsage = 2, kNoNetwork = 3 };
 
-/// Which process this is.
+/// The part of the demo that this process is.
 enum class Role : std::uint8_t { kAll, kRobot, kView };
 
-/// How UTF-8 is chosen.
+/// The choice of characters.
 enum class Glyphs : std::uint8_t { kAuto, kUtf8, kAscii };
 
-/// What the command line says. Limits: `kSecondsMax`; speeds as in log_player.hpp.
+/// The command line. Limits: `kSecondsMax`; speeds as in log_player.hpp.
 struct DemoOptions {
   static constexpr double kSecondsMax = 86'400.0;
 

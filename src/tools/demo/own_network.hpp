@@ -1,13 +1,77 @@
 #pragma once
 
+#include <sys/types.h>
+
+#include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "base/result.hpp"
-#include "tools/demo/child_process.hpp"
 #include "tools/demo/options.hpp"
 
 namespace gimnet::demo {
+
+/// A program that this one started and ends: with it at the latest, even if it crashes. It gets a
+/// process group of its own, so that Ctrl-C in a terminal does not reach it. Its standard input is
+/// empty, its standard error goes to a file. Thread safety: one thread; start children from the
+/// main thread only, whose end ends them.
+class ChildProcess {
+ public:
+  /// The program and its arguments.
+  struct Command {
+    /// Its name for people.
+    std::string title;
+    /// Path and arguments.
+    std::vector<std::string> words;
+    /// The file that takes its standard error.
+    std::string log_path;
+  };
+
+  /// A child that has not ended this long after it was asked to is killed.
+  static constexpr std::int64_t kPatience_ns = 3'000'000'000;
+
+  /// Errors: no such program, no process to be had.
+  static Result<ChildProcess> start(Command command);
+
+  ChildProcess(ChildProcess&& other) noexcept = default;
+  ChildProcess& operator=(ChildProcess&&) = delete;
+  ~ChildProcess() { end(); }
+
+  /// One line of its standard output, without the end. Errors: none within `wait_ns`, or it ended;
+  /// with its last words.
+  [[nodiscard]] Result<std::string> read_line(std::int64_t wait_ns);
+
+  /// The reason of its end and its last words, if it ended by itself; waits at most so long.
+  [[nodiscard]] std::optional<Error> ended(std::int64_t wait_ns = 0);
+
+  /// Asks it to end (SIGTERM), waits, and kills it if need be. Harmless if it has ended.
+  void end();
+
+  /// Waits until it ends by itself, at most so long. Its exit status: code, or 128 + signal;
+  /// nothing if it goes on.
+  [[nodiscard]] std::optional<int> wait(std::int64_t wait_ns);
+
+  /// REQUIRES: end() was not called.
+  [[nodiscard]] pid_t id() const { return state_->id; }
+
+ private:
+  struct State {
+    Command command;
+    pid_t id;
+    int output;
+    std::string pending;
+    std::optional<int> status;
+  };
+
+  explicit ChildProcess(State state) : state_(std::make_unique<State>(std::move(state))) {}
+  [[nodiscard]] std::string last_words() const;
+
+  /// Null: moved from, or ended by end().
+  std::unique_ptr<State> state_;
+};
 
 /// A new folder that only this user may enter, removed with everything in it when the object goes.
 class TemporaryFolder {
@@ -15,18 +79,18 @@ class TemporaryFolder {
   /// Makes it in TMPDIR, or in /tmp. Errors: no place for it.
   static Result<TemporaryFolder> make();
 
-  TemporaryFolder(TemporaryFolder&& other) noexcept;
-  TemporaryFolder& operator=(TemporaryFolder&& other) noexcept;
-  ~TemporaryFolder();
-
-  [[nodiscard]] const std::string& path() const { return path_; }
+  [[nodiscard]] const std::string& path() const { return *path_; }
   /// The path of something in it.
-  [[nodiscard]] std::string operator/(const std::string& name) const { return path_ + "/" + name; }
+  [[nodiscard]] std::string operator/(const std::string& name) const { return *path_ + "/" + name; }
 
  private:
-  explicit TemporaryFolder(std::string path) : path_(std::move(path)) {}
+  struct Remover {
+    void operator()(const std::string* path) const;
+  };
 
-  std::string path_;
+  explicit TemporaryFolder(std::string path) : path_(new std::string(std::move(path))) {}
+
+  std::unique_ptr<const std::string, Remover> path_;
 };
 
 /// The demo's own hub and robot, each a process, with their files in a temporary folder. Ends them,
@@ -39,11 +103,11 @@ class OwnNetwork {
   static Result<OwnNetwork> start(const DemoOptions& options,
                                   const std::string& folder_of_programs);
 
-  /// Where the viewer connects: the TCP address.
+  /// The TCP address, to which the viewer connects.
   [[nodiscard]] const std::string& hub_url() const { return hub_url_; }
 
-  /// What happened to hub or robot, if one of them ended by itself; waits for the hub's end at most
-  /// so long.
+  /// A sentence about the end of hub or robot, if one of them ended by itself; waits for the hub's
+  /// end at most so long.
   [[nodiscard]] std::optional<Error> trouble(std::int64_t wait_ns = 0);
 
  private:

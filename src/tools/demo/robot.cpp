@@ -22,7 +22,7 @@ void Robot::publish_info(std::int64_t now_ns) {
 
 void Robot::handle(const NodePort::Event& event, std::int64_t now_ns) {
   if (event.service != Service::kDrive) return;
-  const std::optional<DriveCommand> command = decode_drive(event.payload);
+  const std::optional<DriveCommand> command = decode<DriveCommand>(event.payload);
   if (!command) return;
   ++drive_total_;
   finish_ = finish_ || command->finish;
@@ -47,15 +47,14 @@ std::optional<Error> Robot::step() {
   }
   if (finished_) return error_;
   if (!finish_) {
-    const RobotSource::Output output{[this](const Odometry& message) {
-                                       ++odometry_total_;
-                                       publish(Service::kOdometry, encode(message));
-                                     },
-                                     [this](const Scan& message) {
-                                       ++scan_total_;
-                                       publish(Service::kScan, encode(message));
-                                     }};
-    source_->advance(now_ns, output);
+    source_->advance(now_ns, {[this, now_ns](Odometry message) {
+                                message.stamp = {++odometry_total_, now_ns};
+                                publish(Service::kOdometry, encode(message));
+                              },
+                              [this, now_ns](Scan message) {
+                                message.stamp = {++scan_total_, now_ns};
+                                publish(Service::kScan, encode(message));
+                              }});
   }
   const bool ends_now = !said_ended_ && (finish_ || source_->info().ended);
   if (ends_now || finish_ || now_ns >= next_info_ns_) publish_info(now_ns);

@@ -11,15 +11,15 @@
 
 namespace gimnet::demo {
 
-/// Where a robot's data come from: a simulation, or a log. A source has no clock of its own: it is
+/// The origin of a robot's data: a simulation, or a log. A source has no clock of its own: it is
 /// told the time, in ns since 1970, and says when it wants to be told again. Thread safety: one
 /// thread.
 class RobotSource {
  public:
-  /// Takes what the robot says. Numbers and stamps are filled in.
+  /// Takes the robot's messages, without number and stamp.
   struct Output {
-    std::function<void(const Odometry&)> on_odometry;
-    std::function<void(const Scan&)> on_scan;
+    std::function<void(Odometry)> on_odometry;
+    std::function<void(Scan)> on_scan;
   };
 
   virtual ~RobotSource() = default;

@@ -11,7 +11,6 @@
 
 #include "tools/demo/canvas.hpp"
 #include "tools/demo/figures.hpp"
-#include "tools/demo/text_format.hpp"
 
 namespace gimnet::demo {
 namespace {
@@ -55,18 +54,15 @@ void draw_seen(Plot& plot, const OccupancyMap& seen) {
   });
 }
 
-void draw_scan(Plot& plot, const PlacedScan& scan) {
+void draw_scan(Plot& plot, const Scan& scan) {
   const double step_m = plot.view().metres_per_dot;
   for (std::size_t beam = 0; beam < scan.ranges_m.size(); ++beam) {
-    const double bearing_rad =
-        scan.first_bearing_rad + scan.bearing_step_rad * static_cast<double>(beam);
-    const Ray ray{position(scan.pose), scan.pose.heading_rad + bearing_rad};
     const bool hit = scan.hit(beam);
     const double reach_m = hit ? static_cast<double>(scan.ranges_m[beam])
                                : std::min(OccupancyMap::kFreeWithoutHit_m, scan.range_max_m);
     const int steps = static_cast<int>(reach_m / step_m);
     for (int step = 0; step <= steps; ++step)
-      plot.ground(point_along(ray, step * step_m), Ground::kBeam);
+      plot.ground(point_along(scan.ray(beam), step * step_m), Ground::kBeam);
     if (hit) plot.dot(scan.end_of(beam), Ink::kScan);
   }
 }
@@ -83,25 +79,17 @@ void draw_robot(Plot& plot, const Pose& pose) {
   plot.triangle(nose, corner(-2.45, 1.1), notch, Ink::kRobot);
 }
 
-Box widened(const Box& box, const Point& point) {
-  return {{std::min(box.least.x_m, point.x_m), std::min(box.least.y_m, point.y_m)},
-          {std::max(box.most.x_m, point.x_m), std::max(box.most.y_m, point.y_m)}};
-}
-
 }  // namespace
 
 View choose_view(const Monitor& monitor, const MapChoice& choice, Extent extent) {
   const Point robot = position(monitor.pose().value_or(Pose{}));
-  View view;
+  Box shown{{robot.x_m - 5.0, robot.y_m - 5.0}, {robot.x_m + 5.0, robot.y_m + 5.0}};
   if (monitor.plan()) {
-    view =
-        Plot::fitted({{0.0, 0.0}, {monitor.plan()->width_m(), monitor.plan()->height_m()}}, extent);
+    shown = {{0.0, 0.0}, {monitor.plan()->width_m(), monitor.plan()->height_m()}};
   } else if (!monitor.seen().empty()) {
-    view = Plot::fitted(widened({monitor.seen().least(), monitor.seen().most()}, robot), extent);
-  } else {
-    view = Plot::fitted({{robot.x_m - 5.0, robot.y_m - 5.0}, {robot.x_m + 5.0, robot.y_m + 5.0}},
-                        extent);
+    shown = monitor.seen().bounds().widened(robot);
   }
+  View view = Plot::fitted(shown, extent);
   if (choice.follow) view.metres_per_dot = std::min(view.metres_per_dot, kFollowMetresPerDot);
   view.metres_per_dot /= choice.zoom;
   if (choice.follow || choice.zoom > 1.0) view.centre = robot;

@@ -8,7 +8,7 @@
 
 namespace gimnet::demo {
 
-/// What the user chose to see.
+/// The user's choice of the view.
 struct MapChoice {
   /// 1: everything fits; more: closer, around the robot.
   double zoom = 1.0;
@@ -27,7 +27,7 @@ void draw_map(Plot& plot, const Monitor& monitor, const MapChoice& choice);
 /// Draws a bar of a round length with its length in metres, from that place to the right.
 void draw_scale(Canvas& canvas, ScreenPlace place, const View& view);
 
-/// What the viewer's screen shows beside what was heard.
+/// The parts of the viewer's screen that the monitor does not know.
 struct ScreenState {
   MapChoice map;
   /// The hub's address, for the title.

@@ -90,23 +90,21 @@ void SimulatedRobot::advance(std::int64_t now_ns, const Output& output) {
     const bool driven = next_ns_ - commanded_ns_ < kDeadMan_ns;
     drive_.step(driven ? command_.twist : Twist{}, static_cast<double>(kPeriod_ns) * 1e-9, map_);
     Odometry odometry;
-    odometry.stamp = {++odometry_total_, now_ns};
     odometry.pose = drive_.pose();
     odometry.twist = drive_.twist();
     odometry.bumped = drive_.bumped();
     odometry.answers = command_.stamp;
     output.on_odometry(odometry);
-    if (odometry_total_ % kPeriodsPerScan != 0) continue;
+    if (++periods_ % kPeriodsPerScan != 0) continue;
 
     const LaserSpec& spec = laser_.spec();
     Scan scan;
-    scan.stamp = {++scan_total_, now_ns};
     scan.pose = drive_.pose();
     scan.first_bearing_rad = spec.bearing_rad(0);
     scan.bearing_step_rad = spec.bearing_rad(1) - spec.bearing_rad(0);
     scan.range_max_m = spec.range_max_m;
     scan.ranges_m = laser_.scan(drive_.pose(), map_);
-    output.on_scan(scan);
+    output.on_scan(std::move(scan));
   }
 }
 

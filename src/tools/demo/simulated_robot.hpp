@@ -31,7 +31,7 @@ class DifferentialDrive {
   void step(const Twist& command, double dt_s, const WorldMap& map);
 
   [[nodiscard]] const Pose& pose() const { return pose_; }
-  /// How it really moves.
+  /// Its real speed.
   [[nodiscard]] Twist twist() const;
   /// Did a wall stop it in the last step?
   [[nodiscard]] bool bumped() const { return bumped_; }
@@ -44,7 +44,7 @@ class DifferentialDrive {
   bool bumped_ = false;
 };
 
-/// How a laser scanner's beams lie: evenly over a field around the heading, right to left.
+/// The beams of a laser scanner: evenly over a field around the heading, right to left.
 struct LaserSpec {
   std::size_t beams = 181;
   double field_rad = std::numbers::pi;
@@ -52,9 +52,8 @@ struct LaserSpec {
   /// Standard deviation of a distance.
   double noise_m = 0.008;
 
-  /// Direction of a beam relative to the heading. REQUIRES: beam < beams.
+  /// Direction of a beam relative to the heading. REQUIRES: beam < beams, and at least 2 beams.
   [[nodiscard]] double bearing_rad(std::size_t beam) const {
-    if (beams < 2) return 0.0;
     return -field_rad / 2.0 +
            field_rad * static_cast<double>(beam) / static_cast<double>(beams - 1);
   }
@@ -100,8 +99,7 @@ class SimulatedRobot final : public RobotSource {
   std::int64_t next_ns_;
   std::int64_t commanded_ns_ = 0;
   DriveCommand command_;
-  std::uint64_t odometry_total_ = 0;
-  std::uint64_t scan_total_ = 0;
+  std::uint64_t periods_ = 0;
 };
 
 }  // namespace gimnet::demo

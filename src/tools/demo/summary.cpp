@@ -6,8 +6,8 @@
 #include <string_view>
 #include <vector>
 
+#include "tools/demo/figures.hpp"
 #include "tools/demo/terminal.hpp"
-#include "tools/demo/text_format.hpp"
 
 namespace gimnet::demo {
 namespace {
@@ -29,16 +29,15 @@ std::string row(std::string_view name, const std::array<std::string, 7>& cells) 
   return line + "\n";
 }
 
-std::string percentile(const SampleWindow& window, double percent) {
-  return duration_text(window.percentile_ns(percent));
-}
-
-std::uint64_t lost_of(std::uint64_t sent, std::uint64_t received) {
-  return sent > received ? sent - received : 0;
-}
-
-std::string rate(std::uint64_t count, double seconds) {
-  return seconds > 0.0 ? fmt::format("{:.1f}", static_cast<double>(count) / seconds) : "–";
+// A row of a stream of which so many were sent and received.
+std::string stream_row(std::string_view name, std::uint64_t sent, std::uint64_t received,
+                       const RunRecord& run, const SampleWindow& age) {
+  const std::string rate =
+      run.seconds > 0.0 ? fmt::format("{:.1f}", static_cast<double>(received) / run.seconds) : "–";
+  return row(name, {count_text(sent), count_text(received),
+                    count_text(sent > received ? sent - received : 0), rate,
+                    duration_text(age.percentile_ns(50)), duration_text(age.percentile_ns(99)),
+                    duration_text(age.percentile_ns(100))});
 }
 
 }  // namespace
@@ -67,7 +66,7 @@ std::vector<std::string> complaints_about(const Monitor& monitor, const RunRecor
     complaints.push_back(fmt::format("robot/drive: {} commands were sent, {} reached the robot",
                                      run.commands, info.drive_total));
   }
-  // A log may hold only odometry, or only scans: what the robot does not say is not missed.
+  // A log may hold only odometry, or only scans; the other stream is not missed.
   const bool heard_nothing = monitor.odometry_stream().received == 0;
   if (heard_nothing && info.odometry_total != 0)
     complaints.emplace_back("robot/odom: no message came at all");
@@ -81,10 +80,9 @@ std::vector<std::string> complaints_about(const Monitor& monitor, const RunRecor
     complaints.emplace_back("the hub did not give its counters");
     return complaints;
   }
-  for (const HubCounters::Drop& drop : monitor.hub()->drops) {
-    if (run.own_hub && drop.reason != "replaced") {
-      complaints.push_back(fmt::format("the hub dropped {} frames: {}", drop.frames, drop.reason));
-    }
+  for (const auto& [reason, frames] : monitor.hub()->drops) {
+    if (run.own_hub && reason != "replaced")
+      complaints.push_back(fmt::format("the hub dropped {} frames: {}", frames, reason));
   }
   if (run.finished && !monitor.hub()->exact())
     complaints.emplace_back("the hub's ledger does not add up");
@@ -97,31 +95,20 @@ std::string summary_text(const Monitor& monitor, const RunRecord& run, bool utf8
       fmt::format("{} for {:.1f} s over {}\n\n", info.source.empty() ? "nothing" : info.source,
                   run.seconds, run.hub_url);
   text += row("", {"sent", "received", "lost", "Hz", "p50", "p99", "worst"});
-  const auto stream = [&](std::string_view name, const StreamRecord& record, std::uint64_t sent,
-                          const SampleWindow& age) {
-    text +=
-        row(name, {count_text(sent), count_text(record.received),
-                   count_text(lost_of(sent, record.received)), rate(record.received, run.seconds),
-                   percentile(age, 50), percentile(age, 99), percentile(age, 100)});
-  };
   // Totals of a robot that is still running are a second old.
-  const bool final = run.finished;
   const StreamRecord& odometry = monitor.odometry_stream();
   const StreamRecord& scan = monitor.scan_stream();
-  stream("robot/odom", odometry, final ? info.odometry_total : odometry.received + odometry.missed,
-         monitor.odometry_age());
-  stream("robot/scan", scan, final ? info.scan_total : scan.received + scan.missed,
-         monitor.scan_age());
-  const std::uint64_t driven = final ? info.drive_total : run.commands;
+  const auto sent = [&run](const StreamRecord& record, std::uint64_t total) {
+    return run.finished ? total : record.received + record.missed;
+  };
+  text += stream_row("robot/odom", sent(odometry, info.odometry_total), odometry.received, run,
+                     odometry.age);
+  text += stream_row("robot/scan", sent(scan, info.scan_total), scan.received, run, scan.age);
+  text += stream_row("robot/drive", run.commands, run.finished ? info.drive_total : run.commands,
+                     run, monitor.drive_stream().age);
   text +=
-      row("robot/drive",
-          {count_text(run.commands), count_text(driven), count_text(lost_of(run.commands, driven)),
-           rate(driven, run.seconds), percentile(monitor.loop_age(), 50),
-           percentile(monitor.loop_age(), 99), percentile(monitor.loop_age(), 100)});
-  text +=
-      "\n  p50, p99, worst: age of a message on arrival; of a command, time until the\n  first "
-      "odometry that follows "
-      "it.\n\n";
+      "\n  p50, p99, worst: age of a message on arrival; of a command, time until the\n"
+      "  first odometry that follows it.\n\n";
   if (monitor.hub()) {
     const HubCounters& hub = *monitor.hub();
     text += fmt::format(
@@ -129,7 +116,8 @@ std::string summary_text(const Monitor& monitor, const RunRecord& run, bool utf8
         count_text(hub.accepted), count_text(hub.copies), count_text(hub.delivered),
         count_text(hub.dropped()), count_text(hub.queued),
         hub.exact() ? "exact" : "does not add up");
-    if (hub.dropped() != 0) text += fmt::format("  dropped: {}\n", hub.drops_text());
+    for (const auto& [reason, frames] : hub.drops)
+      text += fmt::format("  dropped: {} {}\n", frames, reason);
   }
   text += fmt::format("  way: {:.1f} m", monitor.way_m());
   text += run.corners != 0 ? fmt::format(", {} of the course's corners\n", run.corners) : "\n";

@@ -8,7 +8,7 @@
 
 namespace gimnet::demo {
 
-/// What a run is judged by, beside what the monitor heard.
+/// The facts about a run that the monitor does not know.
 struct RunRecord {
   std::string hub_url;
   double seconds = 0.0;
@@ -20,7 +20,7 @@ struct RunRecord {
   bool finished = false;
   /// Nobody else uses the hub: what it dropped was lost by this run.
   bool own_hub = true;
-  /// Why it ended before its time; "" if it did not.
+  /// The reason for which it ended before its time; "" if it did not.
   std::string broken;
 };
 

@@ -78,20 +78,20 @@ char ascii_for(const Glyph& glyph) {
   return '?';
 }
 
-void AnsiWriter::append_glyph(std::string& out, const Glyph& glyph) const {
-  if (!style_.utf8) {
-    out += ascii_for(glyph);
-  } else {
-    append_utf8(out, glyph.code);
-  }
-}
-
 std::string AnsiWriter::attributes(const Glyph& glyph) const {
   const Look& look = look_of(glyph.ink);
   if (style_.colours == ColourDepth::kNone) return std::string(look.colourless);
   if (style_.colours == ColourDepth::k16) return std::string(look.plain);
   const std::string_view ground = kRichGrounds[static_cast<std::size_t>(glyph.ground)];
   return fmt::format("{}{}{}", look.rich, ground.empty() ? "" : ";", ground);
+}
+
+void AnsiWriter::append_glyph(std::string& out, const Glyph& glyph) const {
+  if (!style_.utf8) {
+    out += ascii_for(glyph);
+  } else {
+    append_utf8(out, glyph.code);
+  }
 }
 
 std::string AnsiWriter::update(const Canvas& canvas) {
@@ -121,25 +121,16 @@ std::string AnsiWriter::update(const Canvas& canvas) {
 }
 
 std::string AnsiWriter::lines(const Canvas& canvas) const {
-  const Extent extent = canvas.extent();
   std::string out;
-  for (int row = 0; row < extent.rows; ++row) {
-    int end = extent.columns;
-    const auto blank = [&](int column) {
-      const char32_t code = canvas.at({column, row}).code;
-      return code == U' ' || code == kBrailleFirst;
-    };
-    while (end > 0 && blank(end - 1)) --end;
-    std::string current;
-    for (int column = 0; column < end; ++column) {
-      Glyph glyph = canvas.at({column, row});
-      glyph.ground = Ground::kNone;
-      const std::string wanted = style_.colours == ColourDepth::kNone ? "" : attributes(glyph);
-      if (wanted != current) out += wanted.empty() ? "\x1b[0m" : fmt::format("\x1b[0;{}m", wanted);
-      current = wanted;
+  for (int row = 0; row < canvas.extent().rows; ++row) {
+    std::size_t end = out.size();
+    for (int column = 0; column < canvas.extent().columns; ++column) {
+      const Glyph& glyph = canvas.at({column, row});
       append_glyph(out, glyph);
+      if (glyph.code != U' ' && glyph.code != kBrailleFirst) end = out.size();
     }
-    out += current.empty() ? "\n" : "\x1b[0m\n";
+    out.resize(end);
+    out += '\n';
   }
   return out;
 }

@@ -12,30 +12,30 @@
 
 namespace gimnet::demo {
 
-/// How many colours a terminal has.
+/// The number of colours of a terminal.
 enum class ColourDepth : std::uint8_t { kNone, k16, k256 };
 
-/// What a terminal can show.
+/// The abilities of a terminal.
 struct TerminalStyle {
   bool utf8 = true;
   ColourDepth colours = ColourDepth::k256;
 };
 
-/// Turns canvases into the bytes that show them: plain escape sequences (ECMA-48), only what
-/// changed since the canvas before. Without UTF-8 every character gets the nearest of ASCII. Thread
-/// safety: one thread.
+/// Turns canvases into the bytes that show them: plain escape sequences (ECMA-48), only for the
+/// characters that changed since the canvas before. Without UTF-8 every character gets the nearest
+/// of ASCII. Thread safety: one thread.
 class AnsiWriter {
  public:
   explicit AnsiWriter(TerminalStyle style) : style_(style) {}
 
-  /// What brings a terminal that shows the last canvas to show this one; everything after redraw()
-  /// or a new extent.
+  /// The bytes that bring a terminal from the last canvas to this one; everything after redraw() or
+  /// a new extent.
   [[nodiscard]] std::string update(const Canvas& canvas);
   /// The next update() draws everything: the terminal shows something else.
   void redraw() { shown_.reset(); }
 
-  /// The canvas as lines, without cursor movements, trailing blanks and grounds: for files and
-  /// plain terminals.
+  /// The canvas as lines of bare characters, without trailing blanks: for files and plain
+  /// terminals.
   [[nodiscard]] std::string lines(const Canvas& canvas) const;
 
  private:
@@ -71,10 +71,10 @@ class Terminal {
   /// Columns and rows at this moment; 80 by 24 where the terminal does not say.
   [[nodiscard]] Extent extent() const;
 
-  /// What was typed since; does not wait. False: the keyboard is gone.
+  /// The bytes typed since; does not wait. False: the keyboard is gone.
   [[nodiscard]] bool read(std::string& bytes);
 
-  /// Writes all of it. What a terminal that is gone does not take is lost.
+  /// Writes all of it. The rest is lost where the terminal is gone.
   void write(std::string_view bytes);
 
   /// Asks the terminal itself whether it reads UTF-8: shows a character of three bytes and asks
@@ -88,8 +88,8 @@ class Terminal {
   termios before_;
 };
 
-/// What the environment says of a terminal: colours from NO_COLOR, TERM and COLORTERM; UTF-8 from
-/// LC_ALL, LC_CTYPE and LANG, nothing where these do not name an encoding.
+/// The environment's words on a terminal: colours from NO_COLOR, TERM and COLORTERM; UTF-8 from
+/// LC_ALL, LC_CTYPE and LANG, nothing if these do not name an encoding.
 [[nodiscard]] ColourDepth colours_of_environment();
 [[nodiscard]] std::optional<bool> utf8_of_environment();
 

@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "base/clock.hpp"
+#include "tools/demo/figures.hpp"
 #include "tools/demo/stop_signal.hpp"
-#include "tools/demo/text_format.hpp"
 
 namespace gimnet::demo {
 namespace {
@@ -28,26 +28,14 @@ Viewer::Viewer(NodePort& port, Terminal* terminal, ViewerOptions options)
       writer_(options_.style) {}
 
 void Viewer::take(const NodePort::Event& event) {
-  const std::int64_t now_ns = event.arrival_ns;
-  bool good = false;
-  if (event.service == Service::kOdometry) {
-    if (const std::optional<Odometry> message = decode_odometry(event.payload)) {
-      monitor_.take(*message, now_ns);
-      good = true;
-    }
-  } else if (event.service == Service::kScan) {
-    if (const std::optional<Scan> message = decode_scan(event.payload)) {
-      monitor_.take(*message, now_ns);
-      good = true;
-    }
-  } else if (event.service == Service::kInfo) {
-    if (const std::optional<RobotInfo> message = decode_info(event.payload)) {
-      monitor_.take(*message, now_ns);
-      good = true;
-    }
-  }
-  if (!good) monitor_.garbled();
-  if (first_heard_ns_ == 0 && monitor_.pose()) first_heard_ns_ = now_ns;
+  const auto heard = [&](const auto& message) {
+    if (!message) return monitor_.garbled();
+    monitor_.take(*message, event.arrival_ns);
+  };
+  if (event.service == Service::kOdometry) heard(decode<Odometry>(event.payload));
+  if (event.service == Service::kScan) heard(decode<Scan>(event.payload));
+  if (event.service == Service::kInfo) heard(decode<RobotInfo>(event.payload));
+  if (first_heard_ns_ == 0 && monitor_.pose()) first_heard_ns_ = event.arrival_ns;
 }
 
 void Viewer::press(Key key, std::int64_t now_ns) {
@@ -110,8 +98,8 @@ void Viewer::report_progress(std::int64_t now_ns) {
       "{}",
       static_cast<double>(now_ns - first_heard_ns_) * 1e-9,
       monitor_.odometry_stream().rate.rate_hz(now_ns), monitor_.scan_stream().rate.rate_hz(now_ns),
-      duration_text(monitor_.odometry_age().percentile_ns(50)),
-      duration_text(monitor_.odometry_age().percentile_ns(99)), pose.x_m, pose.y_m,
+      duration_text(monitor_.odometry_stream().age.percentile_ns(50)),
+      duration_text(monitor_.odometry_stream().age.percentile_ns(99)), pose.x_m, pose.y_m,
       monitor_.hub() ? count_text(monitor_.hub()->dropped()) : "?"));
 }
 
@@ -205,9 +193,7 @@ RunRecord Viewer::record() const {
 }
 
 std::string Viewer::last_picture(Extent extent) const {
-  TerminalStyle style = options_.style;
-  style.colours = terminal_ == nullptr ? ColourDepth::kNone : style.colours;
-  return AnsiWriter(style).lines(draw_screen(monitor_, screen_state(ended_ns_), extent));
+  return writer_.lines(draw_screen(monitor_, screen_state(ended_ns_), extent));
 }
 
 }  // namespace gimnet::demo

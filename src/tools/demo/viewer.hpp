@@ -15,7 +15,7 @@
 
 namespace gimnet::demo {
 
-/// How the viewer runs.
+/// The viewer's options.
 struct ViewerOptions {
   /// Ends after so many seconds from the first odometry or scan.
   std::optional<double> seconds;
@@ -38,11 +38,11 @@ class Viewer {
  public:
   static constexpr std::int64_t kFramePeriod_ns = 80'000'000;
   static constexpr std::int64_t kCountersPeriod_ns = 1'000'000'000;
-  /// How long the last messages may take.
+  /// The last messages may take this long.
   static constexpr std::int64_t kFinish_ns = 3'000'000'000;
-  /// How long a broken connection waits to be explained by the end of a process.
+  /// A broken connection waits this long to be explained by the end of a process.
   static constexpr std::int64_t kWhy_ns = 10'000'000'000;
-  /// How long the robot may take to be heard for the first time.
+  /// The robot must be heard within this time.
   static constexpr std::int64_t kFirstSign_ns = 15'000'000'000;
 
   /// `terminal` may be null.

@@ -66,6 +66,11 @@ TEST(LineReader, TakesALineOfTheLimitAndSkipsOneBeyond) {
   }
 }
 
+TEST(LineReader, ALineEndsAtANul) {
+  EXPECT_THAT(read_all(TemporaryFile(std::string("one\0two\nend\n", 12)).path()).lines,
+              ElementsAre("one", "end"));
+}
+
 TEST(LineReader, GivesTheWholeLinesOfACutArchive) {
   std::string text;
   for (int number = 0; number < 50'000; ++number) text += std::to_string(number * 7919) + "\n";

@@ -42,7 +42,6 @@ TEST(LogPlayer, PlaysAtRecordedSpeed) {
   EXPECT_EQ(heard.odometry.size(), 1U);
   player.advance(kStart_ns + 3 * kSecond_ns + 1, heard.output);
   EXPECT_EQ(heard.odometry.size(), 4U);
-  EXPECT_EQ(heard.odometry.back().stamp.number, 4U);
   EXPECT_NEAR(player.info().played_s, 3.0, 1e-6);
 }
 

@@ -14,7 +14,6 @@
 
 #include "tests/client/nif/support/runtime_folder.hpp"
 #include "tests/tools/demo/temporary_file.hpp"
-#include "tools/demo/child_process.hpp"
 #include "tools/demo/own_network.hpp"
 
 namespace gimnet::demo {
@@ -25,7 +24,7 @@ using testing::Not;
 
 constexpr std::int64_t kPatience_ns = 60'000'000'000;
 
-// What the program said, and how it ended.
+// The program's words, and its end.
 struct Outcome {
   int status = -1;
   std::string out;
@@ -68,7 +67,7 @@ class RunTest : public testing::Test {
                          std::filesystem::directory_iterator());
   }
 
-  // What the demo's nodes keep for their next life is not among its own files.
+  // The files that the demo's nodes keep for their next life are not among its own.
   const nif::test::RuntimeFolder runtime_;
   TemporaryFolder folder_ = std::move(TemporaryFolder::make().value());
 };

@@ -12,7 +12,7 @@ namespace {
 
 TEST(Messages, OdometryComesBack) {
   const Odometry sent{{7, 123}, {1.5, -2.5, 0.25}, {0.5, -0.25}, true, {3, 99}};
-  const std::optional<Odometry> got = decode_odometry(encode(sent));
+  const std::optional<Odometry> got = decode<Odometry>(encode(sent));
   ASSERT_TRUE(got);
   EXPECT_EQ(got->stamp.number, 7U);
   EXPECT_EQ(got->stamp.made_ns, 123);
@@ -30,12 +30,12 @@ TEST(Messages, ScansComeBack) {
   sent.bearing_step_rad = 0.5;
   sent.range_max_m = 10.0;
   sent.ranges_m.assign(kScanBeamsMax, 2.5F);
-  const std::optional<Scan> got = decode_scan(encode(sent));
+  const std::optional<Scan> got = decode<Scan>(encode(sent));
   ASSERT_TRUE(got);
   EXPECT_EQ(got->ranges_m, sent.ranges_m);
   EXPECT_EQ(got->first_bearing_rad, -1.5);
   sent.ranges_m.push_back(1.0F);
-  EXPECT_FALSE(decode_scan(encode(sent)));
+  EXPECT_FALSE(decode<Scan>(encode(sent)));
 }
 
 TEST(Messages, InfoComesBackWithAndWithoutTexts) {
@@ -46,7 +46,7 @@ TEST(Messages, InfoComesBackWithAndWithoutTexts) {
   sent.duration_s = 12.5;
   sent.ended = true;
   sent.scan_total = 77;
-  const std::optional<RobotInfo> got = decode_info(encode(sent));
+  const std::optional<RobotInfo> got = decode<RobotInfo>(encode(sent));
   ASSERT_TRUE(got);
   EXPECT_EQ(got->source, "a.log");
   EXPECT_EQ(got->note, "");
@@ -59,7 +59,7 @@ TEST(Messages, InfoComesBackWithAndWithoutTexts) {
 
 TEST(Messages, CommandsComeBack) {
   const DriveCommand sent{{1, 2}, {0.5, 0.25}, 4.0, true, true};
-  const std::optional<DriveCommand> got = decode_drive(encode(sent));
+  const std::optional<DriveCommand> got = decode<DriveCommand>(encode(sent));
   ASSERT_TRUE(got);
   EXPECT_EQ(got->twist.linear_mps, 0.5);
   EXPECT_EQ(got->speed, 4.0);
@@ -77,30 +77,30 @@ TEST(Messages, KeysAreTexts) {
 TEST(Messages, EveryCutIsRefusedOrEqual) {
   const Bytes whole = encode(DriveCommand{{1, 2}, {0.5, 0.25}, 4.0, true, true});
   for (std::size_t size = 0; size < whole.size(); ++size) {
-    EXPECT_FALSE(decode_drive(std::span(whole).first(size))) << size;
+    EXPECT_FALSE(decode<DriveCommand>(std::span(whole).first(size))) << size;
   }
 }
 
 TEST(Messages, NumbersThatAreNoneAreRefused) {
   Odometry odometry;
   odometry.pose.x_m = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_FALSE(decode_odometry(encode(odometry)));
+  EXPECT_FALSE(decode<Odometry>(encode(odometry)));
   odometry.pose.x_m = std::numeric_limits<double>::infinity();
-  EXPECT_FALSE(decode_odometry(encode(odometry)));
+  EXPECT_FALSE(decode<Odometry>(encode(odometry)));
   odometry.pose.x_m = 1e10;
-  EXPECT_FALSE(decode_odometry(encode(odometry)));
+  EXPECT_FALSE(decode<Odometry>(encode(odometry)));
   Scan scan;
   scan.ranges_m = {1.0F, -1.0F};
-  EXPECT_FALSE(decode_scan(encode(scan)));
+  EXPECT_FALSE(decode<Scan>(encode(scan)));
   scan.ranges_m = {std::numeric_limits<float>::quiet_NaN()};
-  EXPECT_FALSE(decode_scan(encode(scan)));
+  EXPECT_FALSE(decode<Scan>(encode(scan)));
 }
 
 TEST(Messages, AWrongTypeIsRefused) {
   proto::bitestream::Writer writer;
   writer.put_text("n", "one");
   writer.put_time("t", 1);
-  EXPECT_FALSE(decode_drive(writer.bytes()));
+  EXPECT_FALSE(decode<DriveCommand>(writer.bytes()));
 }
 
 }  // namespace

@@ -36,8 +36,8 @@ TEST(Monitor, MeasuresAgesAndTheLoopOncePerCommand) {
   monitor.take(message, 3000);
   message.stamp.number = 2;
   monitor.take(message, 9000);
-  EXPECT_EQ(monitor.odometry_age().percentile_ns(0), 2000);
-  EXPECT_EQ(monitor.loop_age().percentile_ns(100), 2500);
+  EXPECT_EQ(monitor.odometry_stream().age.percentile_ns(0), 2000);
+  EXPECT_EQ(monitor.drive_stream().age.percentile_ns(100), 2500);
 }
 
 TEST(Monitor, KeepsATrailAndThinsItOut) {

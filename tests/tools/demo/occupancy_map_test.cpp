@@ -18,7 +18,7 @@ std::map<std::pair<int, int>, bool> cells_of(const OccupancyMap& map) {
   return cells;
 }
 
-PlacedScan beam(const Pose& pose, float range_m) { return {pose, 0.0, 0.0, 10.0, {range_m}}; }
+Scan beam(const Pose& pose, float range_m) { return {{}, pose, 0.0, 0.0, 10.0, {range_m}}; }
 
 TEST(OccupancyMap, ABeamClearsItsWayAndMarksItsEnd) {
   OccupancyMap map;
@@ -29,7 +29,7 @@ TEST(OccupancyMap, ABeamClearsItsWayAndMarksItsEnd) {
   EXPECT_FALSE(cells.at({0, 0}));
   EXPECT_FALSE(cells.at({9, 0}));
   EXPECT_TRUE(cells.at({10, 0}));
-  EXPECT_NEAR(map.most().x_m, 1.05, 1e-6);
+  EXPECT_NEAR(map.bounds().most.x_m, 1.05, 1e-6);
 }
 
 TEST(OccupancyMap, WorksAcrossZeroAndFarAway) {
@@ -59,7 +59,7 @@ TEST(OccupancyMap, ABeamThatMeetsNothingMarksNothing) {
 
 TEST(OccupancyMap, FarHitsDoNotWidenTheBounds) {
   OccupancyMap map;
-  PlacedScan scan = beam({0.0, 0.0, 0.0}, 20.0F);
+  Scan scan = beam({0.0, 0.0, 0.0}, 20.0F);
   scan.range_max_m = 50.0;
   map.add(scan);
   EXPECT_TRUE(map.empty());

@@ -50,6 +50,10 @@ TEST(Robot, PublishesOdometryAndScans) {
   Robot robot(network.robot, simulated);
   ASSERT_TRUE(run_until(robot, [&] { return count(network, Service::kScan) == 1; }));
   EXPECT_EQ(count(network, Service::kOdometry), 4U);
+  const std::optional<Scan> scan = decode<Scan>(network.to_viewer.back().payload);
+  ASSERT_TRUE(scan);
+  EXPECT_EQ(scan->stamp.number, 1U);
+  EXPECT_EQ(scan->stamp.made_ns, network.now_ns);
 }
 
 TEST(Robot, FinishesWhenToldWithItsTotals) {
@@ -62,7 +66,7 @@ TEST(Robot, FinishesWhenToldWithItsTotals) {
   command.finish = true;
   tell(network, command);
   ASSERT_TRUE(run_until(robot, [&] { return robot.finished(); }));
-  const std::optional<RobotInfo> last = decode_info(network.to_viewer.back().payload);
+  const std::optional<RobotInfo> last = decode<RobotInfo>(network.to_viewer.back().payload);
   ASSERT_TRUE(last);
   EXPECT_TRUE(last->ended);
   EXPECT_EQ(last->drive_total, 2U);

@@ -8,7 +8,7 @@
 
 namespace gimnet::demo {
 
-/// What a screen says, as lines.
+/// The text of a screen, as lines.
 inline std::string lines_of(const Canvas& canvas) {
   return AnsiWriter({true, ColourDepth::kNone}).lines(canvas);
 }

@@ -29,9 +29,6 @@ TEST(SimulatedRobot, SpeaksAtItsRates) {
   }
   EXPECT_EQ(heard.odometry.size(), 40U);
   EXPECT_EQ(heard.scans.size(), 10U);
-  EXPECT_EQ(heard.odometry.front().stamp.number, 1U);
-  EXPECT_EQ(heard.odometry.back().stamp.number, 40U);
-  EXPECT_EQ(heard.scans.back().stamp.number, 10U);
   EXPECT_EQ(heard.scans.back().ranges_m.size(), 181U);
 }
 
@@ -175,12 +172,6 @@ TEST(Laser, NoiseIsSmallAndRepeatable) {
   EXPECT_EQ(ranges_m, other.scan(corridor().start(), corridor()));
   EXPECT_NE(ranges_m, one.scan(corridor().start(), corridor()));
   EXPECT_NEAR(ranges_m[90], 1.625, 0.06);
-}
-
-TEST(LaserSpec, OneBeamLooksAhead) {
-  LaserSpec spec;
-  spec.beams = 1;
-  EXPECT_EQ(spec.bearing_rad(0), 0.0);
 }
 
 }  // namespace
