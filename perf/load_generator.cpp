@@ -41,7 +41,7 @@ int main(int argc, char** argv) {
   raise_descriptor_limit();
   Wire null_wire;
   GimnetWire gimnet_wire;
-  Engine engine(is_null ? null_wire : gimnet_wire, parse_endpoint(url));
+  Engine engine(is_null ? null_wire : gimnet_wire, url);
   engine.set_patience(std::chrono::nanoseconds(static_cast<std::int64_t>(patience * 1e9)));
   Findings findings = find_scenario(scenario_name)(engine, options);
   findings.add("rss_peak_bytes", static_cast<double>(peak_resident_bytes(options.process)));

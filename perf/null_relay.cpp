@@ -44,11 +44,10 @@ class Relay {
   Relay(Mode mode, int send_buffer_bytes) : mode_(mode), send_buffer_bytes_(send_buffer_bytes) {}
 
   std::string listen(const std::string& url) {
-    const Endpoint endpoint = parse_endpoint(url);
-    const int listener = listen_on(endpoint);
+    const int listener = listen_on(url);
     watch(EPOLL_CTL_ADD, listener, kListenerFlag | listeners_.size(), EPOLLIN);
-    listeners_.push_back({listener, endpoint});
-    return local_url(listener, endpoint);
+    listeners_.push_back(listener);
+    return local_url(listener, url);
   }
 
   [[noreturn]] void run() {
@@ -70,11 +69,6 @@ class Relay {
   }
 
  private:
-  struct Listener {
-    int socket;
-    Endpoint endpoint;
-  };
-
   void watch(int operation, int descriptor, std::uint64_t tag, std::uint32_t interest) const {
     epoll_event event{};
     event.events = interest;
@@ -82,15 +76,14 @@ class Relay {
     if (::epoll_ctl(epoll_, operation, descriptor, &event) != 0) fail("epoll_ctl", errno);
   }
 
-  void accept_all(const Listener& listener) {
+  void accept_all(int listener) {
     for (;;) {
-      const int accepted =
-          ::accept4(listener.socket, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
+      const int accepted = ::accept4(listener, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
       if (accepted < 0) {
         if (errno == EAGAIN || errno == EINTR || errno == ECONNABORTED) return;
         fail("accept", errno);
       }
-      tune(accepted, listener.endpoint, send_buffer_bytes_);
+      tune(accepted, send_buffer_bytes_);
       watch(EPOLL_CTL_ADD, accepted, connections_.size(), EPOLLIN);
       connections_.push_back({.socket = accepted, .unsent = {}});
     }
@@ -171,7 +164,7 @@ class Relay {
   const Mode mode_;
   const int send_buffer_bytes_;
   const int epoll_ = ::epoll_create1(EPOLL_CLOEXEC);
-  std::vector<Listener> listeners_;
+  std::vector<int> listeners_;
   std::vector<Connection> connections_;
   std::unique_ptr<std::byte[]> buffer_ = std::make_unique<std::byte[]>(kReadBytes);
 };

@@ -8,9 +8,7 @@ the folder of the page's name beside it. A page that does not exist begins as a 
 import json
 import pathlib
 import re
-import subprocess
 import sys
-import tempfile
 import textwrap
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
@@ -19,20 +17,12 @@ from driver.rows import shown, values_of  # noqa: E402
 from driver.suite import CPU, FIELD_TITLES, GOALS, SCENARIOS, Case, verdict  # noqa: E402
 
 PAGE = pathlib.Path(__file__).resolve().parent.parent / "docs" / "performance.md"
-# Without these there is no page; what else there may be, it can do without.
-NEEDED = ("results", "machine", "date", "seconds", "runs", "runs_max", "hub_arguments")
-# Debian's python3-matplotlib belongs to this one; the first in PATH may be another.
-SYSTEM_PYTHON = pathlib.Path("/usr/bin/python3")
 METRIC_TITLES = {CPU: "CPU, ns a message", "p50_us": "round trip, us", "p99_us": "99th percentile, us", "seconds": "seconds",
                  "rss_bytes_per_connection": "bytes a connection", "context_switches_per_second": "context switches/s"}
 COLOURS = {"null": "#888888", "tcphub": "#1f77b4", "tcphub_2_shards": "#17becf", "tcphub_spinning": "#9467bd",
            "nats": "#2ca02c", "mosquitto": "#8c564b", "redis": "#d62728", "zeromq": "#ff7f0e"}
 PERCENTILES = (("p10_us", 0.1), ("p25_us", 0.25), ("p50_us", 0.5), ("p75_us", 0.75), ("p90_us", 0.9), ("p99_us", 0.99),
                ("p999_us", 0.999), ("max_us", 0.9999))
-
-
-class ResultError(Exception):
-    """A file is no result of which a page can be made: one sentence, with its name."""
 
 
 def figure(row: dict, name: str) -> list[float]:
@@ -167,44 +157,15 @@ def draw_all(rows: list[dict], folder: pathlib.Path) -> list[str]:
 
 def write_report(result: dict, page: pathlib.Path) -> None:
     folder = page.parent / page.stem
-    folder.mkdir(parents=True, exist_ok=True)
     record = make_record(result)
+    text = fill((page if page.exists() else PAGE).read_text(), "figures", f"{where_and_when(record)}\n\n{make_table(record)}")
+    folder.mkdir(parents=True, exist_ok=True)
     try:
         draw_all(record["results"], folder)
     except ImportError:
-        if write_by_system_python(result, page):
-            return
-        print("warning: no plots: matplotlib is not installed (package python3-matplotlib)", file=sys.stderr)
+        print(f"warning: no plots: {sys.executable} has no matplotlib (package python3-matplotlib)", file=sys.stderr)
     (folder / "figures.json").write_text(record_text(record))
-    text = fill((page if page.exists() else PAGE).read_text(), "figures", f"{where_and_when(record)}\n\n{make_table(record)}")
     page.write_text(re.sub(r"\]\(\w+/(\w+\.(?:png|json))\)", rf"]({folder.name}/\1)", text))
-
-
-def write_by_system_python(result: dict, page: pathlib.Path) -> bool:
-    """Whether it could."""
-    if not SYSTEM_PYTHON.exists() or SYSTEM_PYTHON.resolve() == pathlib.Path(sys.executable).resolve():
-        return False
-    with tempfile.NamedTemporaryFile("w", suffix=".json") as file:
-        json.dump(result, file)
-        file.flush()
-        return subprocess.run([str(SYSTEM_PYTHON), __file__, file.name, str(page)], stdin=subprocess.DEVNULL, timeout=300).returncode == 0
-
-
-def read_result(path: str) -> dict:
-    """Raises ResultError."""
-    try:
-        result = json.loads(pathlib.Path(path).read_text())
-    except OSError as error:
-        raise ResultError(f"{path} cannot be read: {error.strerror}") from None
-    except ValueError as error:
-        raise ResultError(f"{path} is not JSON ({error}): give what ./dev perf --json printed") from None
-    missing = [name for name in NEEDED if not isinstance(result, dict) or name not in result]
-    if missing:
-        raise ResultError(f"{path} is not a result of ./dev perf --json: it has no {', '.join(missing)}")
-    rows = result["results"]
-    if not isinstance(rows, list) or any(not isinstance(row, dict) or "rounds" not in row for row in rows):
-        raise ResultError(f"{path} does not hold the runs of each row: measure anew with ./dev perf --json")
-    return result
 
 
 def main() -> int:
@@ -215,12 +176,12 @@ def main() -> int:
         print(__doc__.strip(), file=sys.stderr)
         return 2
     try:
-        write_report(read_result(sys.argv[1]), pathlib.Path(sys.argv[2]))
-    except ResultError as error:
-        print(error, file=sys.stderr)
+        write_report(json.loads(pathlib.Path(sys.argv[1]).read_text()), pathlib.Path(sys.argv[2]))
+    except OSError as error:
+        print(f"{error.filename}: {error.strerror}", file=sys.stderr)
         return 1
-    except (KeyError, TypeError, AttributeError) as error:
-        print(f"{sys.argv[1]} is not a whole result of ./dev perf --json: {type(error).__name__} {error}", file=sys.stderr)
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        print(f"{sys.argv[1]} is no result of ./dev perf --json: {type(error).__name__} {error}", file=sys.stderr)
         return 1
     return 0
 

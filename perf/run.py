@@ -23,7 +23,7 @@ import report  # noqa: E402
 from driver import against, control, instructions, subjects, suite, usage  # noqa: E402
 from driver.measure import Outcome, Settings, run_cases, say  # noqa: E402
 from driver.rows import absence_lines, faults_of, make_absences, make_rows, text_table  # noqa: E402
-from driver.subjects import SubjectError, allowed_cpus, remove_left_folders  # noqa: E402
+from driver.subjects import SubjectError, allowed_cpus  # noqa: E402
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 QUICK_SECONDS = 0.4
@@ -58,7 +58,7 @@ def parse_arguments(given: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--size", nargs="+", action="extend", type=usage.payload_bytes, default=[], metavar="BYTES",
                         help="16 to 1,048,576; others than those of the whole run, too")
     parser.add_argument("--transport", nargs="+", action="extend", choices=("tcp", "unix"), default=[])
-    parser.add_argument("--seconds", type=usage.seconds, help="length of each measurement, 0.01 to 600; some scenarios take several times that")
+    parser.add_argument("--seconds", type=usage.seconds, help="length of each measurement, 0.01 to 450; some scenarios take several times that")
     parser.add_argument("--runs", type=usage.positive_whole, help="measurements of which the median is taken (3, and more where they decide nothing)")
     parser.add_argument("--build-dir", type=pathlib.Path, default=ROOT / "build" / "release")
     parser.add_argument("--hub-argument", action="append", default=[], metavar="ARGUMENT",
@@ -76,17 +76,9 @@ def find_impossible(arguments: argparse.Namespace) -> str | None:
     try:
         if mode == "--instructions" and arguments.instructions:
             instructions.require_script(arguments.instructions, instructions.known_scripts())
-        if mode in ("--instructions", "--control"):
-            return None
-        plan = choose_plan(arguments)
-        # The null relay is always there, but is only something to measure where it was asked for.
-        if (why := subjects.why_nothing(plan, arguments.subjects or list(subjects.SUBJECTS))) is not None:
-            return f"there is nothing to measure: {why}"
         if mode == "--against":
-            cases = cases_against(arguments)
-            against.require_comparable(ROOT, arguments.against, cases, arguments.runs)
-            return usage.find_too_long(cases, arguments.seconds)
-        return usage.find_too_long(plan, arguments.seconds)
+            against.require_comparable(ROOT, arguments.against, cases_against(arguments), arguments.runs)
+        return None if mode is not None or choose_plan(arguments) else "these scenarios are not measured over that transport"
     except (instructions.CountingError, against.BuildError) as error:
         return str(error)
 
@@ -283,7 +275,6 @@ def main() -> int:
         return 0
     if arguments.instructions is not None:
         return count_instructions(arguments)
-    remove_left_folders()
     if arguments.control:
         return measure_control(arguments)
     if arguments.against is not None:

@@ -1,17 +1,15 @@
 """Runs cases: each on a fresh subject, subjects in turns, so that a slow minute of the machine hits all of them."""
 
 import json
-import os
 import pathlib
-import select
 import subprocess
 import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from driver.rows import Outcome, make_rows, values_of
-from driver.subjects import CLIENTS, READY_SECONDS, Subject, SubjectError, allowed_cpus, child_setup, make_subject, why_absent
+from driver.rows import Outcome, key_of, make_rows, values_of
+from driver.subjects import (CLIENTS, Subject, SubjectError, allowed_cpus, child_setup, make_subject, read_line, why_absent)
 from driver.suite import GOALS, RIVALS, Case, Goal, Plan, standing
 
 # A generator that takes this much longer than its measurement hangs.
@@ -33,7 +31,7 @@ class Settings:
     hub_arguments: list[str] = field(default_factory=list)
     tries_max: int = 2  # of each run
     patience_seconds: float = 2.0  # a message that takes longer is lost
-    runs_max: int = 0  # of those whose runs lie far apart or decide nothing; not above `runs`: none of them is made again
+    runs_max: int = 0  # of groups of which runs lie far apart or decide nothing; not above `runs`: none of them is made again
     extra_seconds: float = 0  # what is left for such runs
 
     def length_of(self, subject: str, case: Case) -> float:
@@ -47,47 +45,39 @@ def say(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-def await_ready(partner: subprocess.Popen) -> None:
-    """The partner says so when its messages would reach it."""
-    deadline = time.monotonic() + READY_SECONDS
-    line = b""
-    while not line.endswith(b"\n"):
-        ready, _, _ = select.select([partner.stdout], [], [], max(0.0, deadline - time.monotonic()))
-        piece = os.read(partner.stdout.fileno(), 100) if ready else b""
-        if not piece:
-            raise SubjectError("the answering program was not ready in time" if not ready else ended(partner))
-        line += piece
-
-
 def ended(partner: subprocess.Popen) -> str:
-    partner.wait(READY_SECONDS)
     return f"the answering program ended with {partner.returncode}: {partner.stderr.read(2000).decode(errors='replace').strip()}"
 
 
-def run_pair(subject: Subject, case: Case, settings: Settings) -> dict[str, float]:
-    """What the asking program found. Raises SubjectError."""
+def run_client(subject: Subject, command: list[str], cpus: list[int], limit: float) -> dict[str, float]:
+    """What a measuring program found. Raises SubjectError."""
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=limit, stdin=subprocess.DEVNULL,
+                              preexec_fn=child_setup(cpus))
+    except subprocess.TimeoutExpired:
+        raise SubjectError(f"{subject.name}: no result within {limit:.0f} s") from None
+    subject.check_alive()
+    if done.returncode != 0:
+        raise SubjectError(f"{subject.name}: {done.stderr.strip() or f'the measuring program ended with {done.returncode}'}")
+    return json.loads(done.stdout)
+
+
+def run_pair(subject: Subject, case: Case, settings: Settings, seconds: float, limit: float) -> dict[str, float]:
+    """What the asking program found, and the hub's ledger. Raises SubjectError."""
     answering, asking = case.spec.roles
     cpus = allowed_cpus()[:1] if case.spec.one_cpu else allowed_cpus()
-    seconds = settings.length_of(subject.name, case)
     command = [str(settings.build / "bin" / CLIENTS[subject.name]), "--connect", subject.urls[case.transport],
                "--size", str(case.size), "--seconds", str(seconds),
                "--patience", str(settings.patience_seconds), "--hub", str(subject.pid)]
     partner = subprocess.Popen([*command, "--role", answering], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                                stderr=subprocess.PIPE, preexec_fn=child_setup(cpus))
     try:
-        await_ready(partner)
-        limit = 3 * seconds + 5 * settings.patience_seconds + EXTRA_SECONDS
-        try:
-            done = subprocess.run([*command, "--role", asking, "--partner", str(partner.pid)], capture_output=True,
-                                  text=True, timeout=limit, stdin=subprocess.DEVNULL, preexec_fn=child_setup(cpus))
-        except subprocess.TimeoutExpired:
-            raise SubjectError(f"{subject.name}: no result within {limit:.0f} s") from None
-        subject.check_alive()
+        # It says so when its partner's messages would reach it.
+        if read_line(partner) is None:
+            raise SubjectError("the answering program was not ready in time" if partner.poll() is None else ended(partner))
+        findings = run_client(subject, [*command, "--role", asking, "--partner", str(partner.pid)], cpus, limit)
         if partner.poll() is not None:
             raise SubjectError(f"{subject.name}: {ended(partner)}")
-        if done.returncode != 0:
-            raise SubjectError(f"{subject.name}: {done.stderr.strip() or f'the client ended with {done.returncode}'}")
-        findings = json.loads(done.stdout)
     finally:
         partner.kill()
         partner.communicate()
@@ -95,47 +85,30 @@ def run_pair(subject: Subject, case: Case, settings: Settings) -> dict[str, floa
 
 
 def ask_for_ledger(subject: Subject, case: Case, settings: Settings) -> dict[str, float]:
-    """What a hub of ours accounts for, now that both programs are gone; nothing of others, which keep no account."""
+    """The account of a hub of ours, now that both programs are gone; nothing of others, which keep none."""
     if subject.name in RIVALS:
         return {}
     # The scenario in which nobody is connected: it only asks at its end.
     command = [str(settings.build / "bin" / "load_generator"), "--connect", subject.urls[case.transport],
                "--process", str(subject.pid), "--scenario", "idle_alone", "--seconds", "0.01"]
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=EXTRA_SECONDS, stdin=subprocess.DEVNULL,
-                              preexec_fn=child_setup(allowed_cpus()))
-    except subprocess.TimeoutExpired:
-        raise SubjectError(f"{subject.name}: did not tell its ledger within {EXTRA_SECONDS} s") from None
-    if done.returncode != 0:
-        raise SubjectError(f"{subject.name}: did not tell its ledger: {done.stderr.strip()}")
-    return {name: value for name, value in json.loads(done.stdout).items() if name in LEDGER}
+    findings = run_client(subject, command, allowed_cpus(), EXTRA_SECONDS)
+    return {name: value for name, value in findings.items() if name in LEDGER}
 
 
 def run_once(subject: Subject, case: Case, settings: Settings) -> dict[str, float]:
-    if case.spec.roles is not None:
-        with subject:
-            return run_pair(subject, case, settings)
-    cpus = allowed_cpus()
     seconds = settings.length_of(subject.name, case)
-    command = [str(settings.build / "bin" / "load_generator"), "--scenario", case.scenario,
-               "--size", str(case.size), "--seconds", str(seconds),
-               "--patience", str(settings.patience_seconds)]
-    if settings.clients is not None:
-        command += ["--clients", str(settings.clients)]
-    if subject.name == "null":
-        command.append("--null")
+    limit = 3 * seconds + 5 * settings.patience_seconds + EXTRA_SECONDS
     with subject:
-        command += ["--connect", subject.urls[case.transport], "--process", str(subject.pid)]
-        limit = 3 * seconds + 5 * settings.patience_seconds + EXTRA_SECONDS
-        try:
-            done = subprocess.run(command, capture_output=True, text=True, timeout=limit, stdin=subprocess.DEVNULL,
-                                  preexec_fn=child_setup([cpus[0] if case.spec.one_cpu else cpus[-1]]))
-        except subprocess.TimeoutExpired:
-            raise SubjectError(f"{subject.name}: no result within {limit:.0f} s") from None
-        subject.check_alive()
-        if done.returncode != 0:
-            raise SubjectError(f"{subject.name}: {done.stderr.strip() or f'the generator ended with {done.returncode}'}")
-        return json.loads(done.stdout)
+        if case.spec.roles is not None:
+            return run_pair(subject, case, settings, seconds, limit)
+        command = [str(settings.build / "bin" / "load_generator"), "--scenario", case.scenario,
+                   "--size", str(case.size), "--seconds", str(seconds), "--patience", str(settings.patience_seconds),
+                   "--connect", subject.urls[case.transport], "--process", str(subject.pid)]
+        if settings.clients is not None:
+            command += ["--clients", str(settings.clients)]
+        if subject.name == "null":
+            command.append("--null")
+        return run_client(subject, command, [allowed_cpus()[0 if case.spec.one_cpu else -1]], limit)
 
 
 def run_with_tries(make: Callable[[], Subject], case: Case, settings: Settings) -> dict[str, float]:
@@ -181,30 +154,12 @@ def decides_nothing(goal: Goal, row: dict) -> bool:
     return bool(values) and None in (standing(goal, values, limit) for limit in (goal.goal, goal.bound) if limit is not None)
 
 
-def find_undecided(group: list[Outcome]) -> list[Outcome]:
-    """Those of a group with a bound or a goal that some of their runs meet and others do not."""
-    doubtful = {(row["subject"], row["scenario"], row["size"], row["transport"]) for row in make_rows(group) for goal in GOALS
-                if (goal.subject, goal.scenario, goal.size, goal.transport)
-                == (row["subject"], row["scenario"], row["size"], row["transport"]) and decides_nothing(goal, row)}
-    return [each for each in group if (each.subject, each.case.scenario, each.case.size, each.case.transport) in doubtful]
-
-
-def to_repeat(group: list[Outcome], undecided: list[Outcome]) -> list[Outcome]:
-    """The wild and the undecided ones of a group, in its order, with those that a verdict compares them with: the null relay, the
-    hub where another one is wild, and the others that goals name where the hub is; of libraries, all."""
-    doubtful = [outcome for outcome in group if outcome.error is None
-                and (is_wild(outcome) or any(outcome is each for each in undecided))]
-    return [outcome for outcome in group if outcome.error is None
-            and any(outcome is each or is_partner(outcome, each) for each in doubtful)]
-
-
-def is_partner(other: Outcome, doubtful: Outcome) -> bool:
-    case = doubtful.case
-    if case.spec.roles is not None or other.subject == "null":
-        return True
-    if other.subject == doubtful.subject and other.case.scenario == case.spec.beside:
-        return True
-    return other.case == case and other.subject == "tcphub"
+def is_doubtful(group: list[Outcome]) -> bool:
+    """Do runs of the group lie far apart, or is there a bound or a goal that some of its runs meet and others do not?"""
+    rows = {key_of(row): row for row in make_rows(group)}
+    return any(outcome.error is None and is_wild(outcome) for outcome in group) or any(
+        decides_nothing(goal, rows[key]) for goal in GOALS
+        if (key := (goal.subject, goal.scenario, goal.size, goal.transport)) in rows)
 
 
 def run_group(outcomes: list[Outcome], settings: Settings) -> None:
@@ -214,16 +169,16 @@ def run_group(outcomes: list[Outcome], settings: Settings) -> None:
 
 
 def repeat(outcomes: list[Outcome], settings: Settings) -> None:
-    """More runs of what lies far apart or decides nothing, as long as there is time for that: no group takes more than its share
-    of it. What decides nothing is looked up once: to stop as soon as something is decided would be to choose the answer."""
+    """More runs of a doubtful group, as long as there is time for that: no group takes more than its share of it. Whether it is
+    doubtful is looked up once: to stop as soon as something is decided would be to choose the answer."""
     left_for_others = settings.extra_seconds * (1 - GROUP_SHARE)
-    undecided = find_undecided(outcomes) if settings.runs < settings.runs_max else []
+    if settings.runs >= settings.runs_max or not is_doubtful(outcomes):
+        return
     for number in range(settings.runs, settings.runs_max):
-        again = to_repeat(outcomes, undecided)
-        if not again or settings.extra_seconds <= left_for_others:
+        if settings.extra_seconds <= left_for_others:
             return
         begin = time.monotonic()
-        run_round(again, number, settings)
+        run_round(outcomes, number, settings)
         settings.extra_seconds -= time.monotonic() - begin
 
 

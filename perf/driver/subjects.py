@@ -4,9 +4,6 @@ Other hubs are Debian's packages, each as its documentation would have it for me
 on disk, no passwords, TCP_NODELAY, limits that do not stand in the way. They are measured with their own libraries."""
 
 import ctypes
-import fcntl
-import glob
-import io
 import os
 import pathlib
 import re
@@ -19,14 +16,12 @@ import subprocess
 import tempfile
 import time
 
-from driver.suite import WITH_LIBRARY, Case, Plan
+from driver.suite import Case
 
 READY_SECONDS = 15
 PR_SET_PDEATHSIG = 1
 # Where the system lets it, a subject may hold so many connections: some refuse what 10,000 and their own files need.
 DESCRIPTORS_MIN = 65_536
-FOLDER_PREFIX = "gimnet-perf-"
-LOCK = "in-use"
 # The hub sets this on every connection (`socket_send_bytes`); the null relay gets the same.
 SEND_BUFFER_BYTES = 256 * 1024
 # Debian keeps servers where a user's PATH does not look.
@@ -59,25 +54,19 @@ def child_setup(cpus: list[int]):
     return set_up
 
 
-def lock_folder(folder: str) -> io.FileIO:
-    """Who has it open says that the folder is in use; the kernel lets it go with the process, however that ends."""
-    lock = open(os.path.join(folder, LOCK), "wb", buffering=0)
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        lock.close()
-        raise
-    return lock
-
-
-def remove_left_folders() -> None:
-    """Those of runs that were killed and could not clear up."""
-    for path in glob.glob(os.path.join(tempfile.gettempdir(), FOLDER_PREFIX + "*", LOCK)):
-        try:
-            with lock_folder(os.path.dirname(path)):
-                shutil.rmtree(os.path.dirname(path), ignore_errors=True)
-        except OSError:
-            pass  # in use, or somebody else's
+def read_line(process: subprocess.Popen) -> str | None:
+    """The first line that a program prints; None: it ended, or printed none within READY_SECONDS."""
+    deadline = time.monotonic() + READY_SECONDS
+    line = b""
+    while not line.endswith(b"\n"):
+        ready, _, _ = select.select([process.stdout], [], [], max(0.0, deadline - time.monotonic()))
+        piece = os.read(process.stdout.fileno(), 4096) if ready else b""
+        if not piece:
+            if ready:
+                process.wait(READY_SECONDS)
+            return None
+        line += piece
+    return line.decode()
 
 
 class Subject:
@@ -97,8 +86,7 @@ class Subject:
         raise NotImplementedError
 
     def __enter__(self) -> "Subject":
-        self._folder = tempfile.TemporaryDirectory(prefix=FOLDER_PREFIX)
-        self._lock = lock_folder(self._folder.name)
+        self._folder = tempfile.TemporaryDirectory(prefix="gimnet-perf-")
         self._log = open(os.path.join(self._folder.name, "log"), "w+b")
         command = self.command(self._folder.name)
         try:
@@ -130,20 +118,13 @@ class Subject:
         raise SubjectError(f"{self.name} ended by itself with {how}: {self._log_end()}")
 
     def _await_ready(self) -> None:
-        deadline = time.monotonic() + READY_SECONDS
-        line = b""
-        output = self._process.stdout.fileno()
-        while not line.endswith(b"\n"):
-            ready, _, _ = select.select([output], [], [], max(0.0, deadline - time.monotonic()))
-            piece = os.read(output, 4096) if ready else b""
-            if not piece:
-                self._process.wait(1) if ready else None
-                self.check_alive()
-                raise SubjectError(f"{self.name} was not ready within {READY_SECONDS} s: {self._log_end()}")
-            line += piece
-        words = line.decode().split()
+        line = read_line(self._process)
+        if line is None:
+            self.check_alive()
+            raise SubjectError(f"{self.name} was not ready within {READY_SECONDS} s: {self._log_end()}")
+        words = line.split()
         if len(words) < 3 or words[0] != "ready":
-            raise SubjectError(f"{self.name} did not print its addresses, but: {line.decode().strip()}")
+            raise SubjectError(f"{self.name} did not print its addresses, but: {line.strip()}")
         self.urls = {"unix" if url.startswith("unix:") else "tcp": url for url in words[1:]}
 
     def _log_end(self) -> str:
@@ -162,7 +143,6 @@ class Subject:
                 self._process.stdout.close()
             self._process = None
         self._log.close()
-        self._lock.close()
         self._folder.cleanup()
 
 
@@ -308,22 +288,6 @@ def why_absent(name: str, case: Case, build: pathlib.Path) -> str | None:
     if not (build / "bin" / CLIENTS[name]).exists():
         return f"{CLIENTS[name]} was not built: no library (package {LIBRARY_PACKAGES[name]})"
     return RIVAL_CLASSES[name].why_absent(build)
-
-
-def why_nothing(plan: Plan, wanted: list[str]) -> str | None:
-    """Why none of the wanted subjects has a row, whatever is built or installed; None: one has."""
-    if not plan:
-        return "these scenarios are not measured over that transport"
-    reasons = {}
-    for name in wanted:
-        cases = [case for case, subjects in plan.items() if name in subjects]
-        found = {why_never(name, case) for case in cases}
-        if not cases:
-            found = {OF_LIBRARIES if name in RIVAL_CLASSES else f"libraries are measured with {', '.join(WITH_LIBRARY)} only"}
-        if None in found:
-            return None
-        reasons[name] = " and ".join(sorted(found))
-    return "; ".join(f"{name}: {reason}" for name, reason in reasons.items())
 
 
 def make_subject(name: str, case: Case, build: pathlib.Path, hub_arguments: list[str]) -> Subject:

@@ -102,7 +102,7 @@ def whole_cases() -> list[Case]:
 Plan = dict[Case, tuple[str, ...]]
 
 
-def whole_plan(subjects: tuple[str, ...]) -> Plan:
+def plan_of(cases: list[Case], subjects: tuple[str, ...]) -> Plan:
     """Every subject in every case; of the hub's variants what they are for."""
     def among(case: Case, name: str) -> bool:
         if name == "tcphub_spinning":
@@ -111,18 +111,16 @@ def whole_plan(subjects: tuple[str, ...]) -> Plan:
             return case.transport == "tcp" and case.size in (case.spec.sizes[0], 65536)
         return True
 
-    return {case: tuple(name for name in case.among(subjects) if among(case, name)) for case in whole_cases()}
+    return {case: tuple(name for name in case.among(subjects) if among(case, name)) for case in cases}
 
 
-# Where the hub's variants are for, in a quick run.
-QUICK_OF_SHARDS = frozenset({Case("one_to_one", 16, "tcp"), Case("one_to_one", 65536, "tcp"), Case("in_turns", 16, "tcp"), Case("fan_out_100", 16, "tcp")})
-QUICK_OF_SPINNING = frozenset({Case("one_to_one", 16, "tcp"), Case("ping_two_cpus", 16, "tcp"), Case("ping_paced", 16, "tcp")})
+def whole_plan(subjects: tuple[str, ...]) -> Plan:
+    return plan_of(whole_cases(), subjects)
 
 
 def quick_plan(subjects: tuple[str, ...]) -> Plan:
-    """The cases that goals are set for, and of the hub's variants what they are for."""
-    variants = {"tcphub_2_shards": QUICK_OF_SHARDS, "tcphub_spinning": QUICK_OF_SPINNING}
-    return {case: tuple(name for name in case.among(subjects) if case in variants.get(name, (case,))) for case in quick_cases()}
+    """The cases that goals are set for."""
+    return plan_of(quick_cases(), subjects)
 
 
 def quick_cases() -> list[Case]:

@@ -35,7 +35,7 @@ void await_answers(Engine& engine) {
   if (!answered) fail("the subject did not answer all keep-alives in time");
 }
 
-/// What the subject used meanwhile, from rest to rest, and for how many keep-alives: word and
+/// The time that the subject used from rest to rest, and the keep-alives that it had: word and
 /// answer are one.
 struct KeepAlivesUsed {
   double cpu_ns = 0;
@@ -93,7 +93,7 @@ Findings idle(Engine& engine, const RunOptions& options) {
   return findings;
 }
 
-/// What a subject does to which nobody is connected.
+/// The work of a subject to which nobody is connected.
 Findings idle_alone(Engine& engine, const RunOptions& options) {
   std::this_thread::sleep_for(std::min<std::chrono::nanoseconds>(options.duration, kStarting));
   const auto switches_begin = context_switches(options.process);

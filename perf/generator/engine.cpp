@@ -4,6 +4,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
@@ -22,9 +23,9 @@ constexpr std::chrono::milliseconds kKeepAlive{900};
 
 }  // namespace
 
-Engine::Engine(Wire& wire, Endpoint endpoint)
+Engine::Engine(Wire& wire, const std::string& url)
     : wire_(wire),
-      endpoint_(std::move(endpoint)),
+      address_(address_of(url)),
       epoll_(::epoll_create1(EPOLL_CLOEXEC)),
       buffer_(std::make_unique<std::byte[]>(kCarryBytesMax + kReadBytes)),
       next_keep_alive_(Clock::now() + kKeepAlive) {}
@@ -36,7 +37,7 @@ Engine::~Engine() {
 
 void Engine::connect(std::size_t count) {
   for (std::size_t begun = 0; begun < count; ++begun) {
-    clients_.push_back(std::make_unique<Client>(clients_.size(), connect_to(endpoint_)));
+    clients_.push_back(std::make_unique<Client>(clients_.size(), connect_to(address_)));
     watch(*clients_.back());
     wire_.open(*clients_.back());
     const bool room = poll_until(
@@ -71,10 +72,9 @@ void Engine::join_group(std::size_t first_subscriber, std::size_t count) {
       fail("no answer to SUBSCRIBE");
   }
   const auto all_in_group = [this, first_subscriber, count] {
-    for (std::size_t index = first_subscriber; index < first_subscriber + count; ++index) {
-      if (!client(index).is_in_group) return false;
-    }
-    return true;
+    return std::all_of(clients_.begin() + static_cast<std::ptrdiff_t>(first_subscriber),
+                       clients_.begin() + static_cast<std::ptrdiff_t>(first_subscriber + count),
+                       [](const auto& client) { return client->is_in_group; });
   };
   if (!poll_until(all_in_group, answer_limit()))
     fail("the subject did not answer every SUBSCRIBE in time");

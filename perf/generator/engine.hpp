@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "generator/client.hpp"
 #include "generator/wire.hpp"
 #include "net/socket.hpp"
 
@@ -20,7 +19,7 @@ using Clock = std::chrono::steady_clock;
 /// A subject that refuses, closes or does not answer ends the program with a sentence.
 class Engine {
  public:
-  Engine(Wire& wire, Endpoint endpoint);
+  Engine(Wire& wire, const std::string& url);
   ~Engine();
   Engine(const Engine&) = delete;
   Engine& operator=(const Engine&) = delete;
@@ -43,8 +42,8 @@ class Engine {
   void stop_reading(Client& client);
   /// Closes its connection, whatever is unread. REQUIRES: nothing is published by it any more.
   void close(Client& client);
-  /// What stays away for longer is lost; 2 s unless set. More where nothing is timed, and a busy
-  /// machine no fault.
+  /// A message that stays away for longer is lost; 2 s unless set. More if nothing is timed, and a
+  /// busy machine is no fault.
   void set_patience(std::chrono::nanoseconds patience) { patience_ = patience; }
   [[nodiscard]] std::chrono::nanoseconds patience() const { return patience_; }
   /// A subject that answers a request later than this is given up.
@@ -61,7 +60,7 @@ class Engine {
   void on_closed(Client& client);
 
   Wire& wire_;
-  const Endpoint endpoint_;
+  const impair::Address address_;
   const int epoll_;
   std::unique_ptr<std::byte[]> buffer_;
   std::vector<std::unique_ptr<Client>> clients_;

@@ -105,7 +105,7 @@ bool Flood::publish() {
   return any;
 }
 
-/// What comes after it was given up was late, not lost.
+/// A message that comes after it was given up was late, not lost.
 void Flood::settle(std::uint64_t count) {
   settled_ += count;
   if (settled_ + missing_ > expected_)

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <string>
 
+#include "base/clock.hpp"
 #include "net/socket.hpp"
 #include "proto/control/control_message.hpp"
 #include "proto/control/ctrl.hpp"
@@ -20,10 +20,12 @@ constexpr const char* kPublisherName = "publisher";
 constexpr const char* kServiceName = "data";
 constexpr std::uint16_t kRequestNumber = 1;
 
-std::int64_t wall_clock_ns() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(
-             std::chrono::system_clock::now().time_since_epoch())
-      .count();
+/// A frame of FLOW is written at once.
+template <class Message>
+void send_flow(Client& client, const Message& message, std::uint32_t from) {
+  std::array<std::byte, proto::flow::kFrameSizeMax> frame{};
+  const std::size_t size = proto::flow::encode_frame(message, NodeId{from}, frame);
+  client.write_control(std::span<const std::byte>(frame).first(size));
 }
 
 /// The message, or the end of the program.
@@ -158,11 +160,10 @@ void GimnetWire::take_flow(Client& client, std::span<const std::byte> body) {
   const auto message = proto::flow::decode(body);
   if (!message) return client.inbox.on_wrong();
   if (const auto* const ping = std::get_if<proto::flow::Ping>(&*message)) {
-    std::array<std::byte, proto::flow::kFrameSizeMax> frame{};
-    const proto::flow::Pong pong{
-        .sequence = ping->sequence, .sent_ns = ping->sent_ns, .now_ns = wall_clock_ns()};
-    const std::size_t size = proto::flow::encode_frame(pong, NodeId{node_id(client)}, frame);
-    client.write_control(std::span<const std::byte>(frame).first(size));
+    send_flow(client,
+              proto::flow::Pong{
+                  .sequence = ping->sequence, .sent_ns = ping->sent_ns, .now_ns = wall_now_ns()},
+              node_id(client));
     ++keep_alives_.asked;
   } else if (std::holds_alternative<proto::flow::Pong>(*message)) {
     ++keep_alives_.answered;
@@ -175,12 +176,10 @@ void GimnetWire::take_flow(Client& client, std::span<const std::byte> body) {
 }
 
 void GimnetWire::keep_alive(Client& client) {
-  std::array<std::byte, proto::flow::kFrameSizeMax> frame{};
   ++keep_alives_.said;
-  const proto::flow::Ping ping{.sequence = ++sessions_[client.index()].pings,
-                               .sent_ns = wall_clock_ns()};
-  const std::size_t size = proto::flow::encode_frame(ping, NodeId{node_id(client)}, frame);
-  client.write_control(std::span<const std::byte>(frame).first(size));
+  const std::uint32_t number = ++sessions_[client.index()].pings;
+  send_flow(client, proto::flow::Ping{.sequence = number, .sent_ns = wall_now_ns()},
+            node_id(client));
 }
 
 }  // namespace gimnet::perf

@@ -6,6 +6,8 @@
 #include <span>
 #include <vector>
 
+#include "base/endian.hpp"
+
 // Messages of a measurement. A payload is 8 bytes of stamp (stream << 48 | sequence), then a fixed
 // pseudo-random pattern. So a block of messages is built once, only stamps are renewed, and a
 // receiver checks every byte with one comparison.
@@ -23,25 +25,21 @@ using StreamId = std::uint16_t;
   return (static_cast<std::uint64_t>(stream) << 48) | sequence;
 }
 
-inline void store_u32(std::byte* to, std::uint32_t value) {
-  std::memcpy(to, &value, sizeof(value));
-}
-inline void store_u64(std::byte* to, std::uint64_t value) {
-  std::memcpy(to, &value, sizeof(value));
-}
-[[nodiscard]] inline std::uint32_t load_u32(const std::byte* from) {
-  std::uint32_t value = 0;
-  std::memcpy(&value, from, sizeof(value));
-  return value;
-}
-[[nodiscard]] inline std::uint64_t load_u64(const std::byte* from) {
-  std::uint64_t value = 0;
-  std::memcpy(&value, from, sizeof(value));
-  return value;
-}
-
 /// A payload of `size` bytes with stamp 0. REQUIRES: kPayloadBytesMin <= size <= kPayloadBytesMax.
-[[nodiscard]] std::span<const std::byte> pattern_payload(std::size_t size);
+[[nodiscard]] inline std::span<const std::byte> pattern_payload(std::size_t size) {
+  static const std::vector<std::byte> pattern = [] {
+    std::vector<std::byte> bytes(kPayloadBytesMax);
+    std::uint64_t state = 0x9E3779B97F4A7C15ull;
+    for (std::size_t at = kStampBytes; at < bytes.size(); at += 8) {
+      state ^= state << 13;  // Marsaglia's xorshift64
+      state ^= state >> 7;
+      state ^= state << 17;
+      store_le(bytes.data() + at, state);
+    }
+    return bytes;
+  }();
+  return {pattern.data(), size};
+}
 
 /// Encoded messages, built once and sent again and again: before each round only the stamps, and
 /// the message numbers of fragmented messages, are renewed.
@@ -72,11 +70,11 @@ class MessageBlock {
   /// Gives every message its next sequence. REQUIRES: nothing of the block is still being sent.
   void renew() {
     for (const auto& stamp : stamps_) {
-      store_u64(bytes.data() + stamp.position,
-                make_stamp(stamp.stream, next_sequences_[stamp.stream]++));
+      store_le(bytes.data() + stamp.position,
+               make_stamp(stamp.stream, next_sequences_[stamp.stream]++));
     }
     for (const auto& number : numbers_)
-      store_u32(bytes.data() + number.position, next_number_ + number.message);
+      store_le(bytes.data() + number.position, next_number_ + number.message);
     next_number_ += static_cast<std::uint32_t>(stamps_.size());
   }
 
@@ -112,12 +110,12 @@ class Inbox {
   /// A whole message.
   void on_message(std::span<const std::byte> payload) {
     if (payload.size() != payload_.size() ||
-        load_u64(payload.data() + 8) != load_u64(payload_.data() + 8) ||
+        load_le<std::uint64_t>(payload.data() + 8) != load_le<std::uint64_t>(payload_.data() + 8) ||
         (payload.size() > 16 && !same(payload, 16))) {
       ++wrong_;
       return;
     }
-    if (take_stamp(load_u64(payload.data()))) ++delivered_;
+    if (take_stamp(load_le<std::uint64_t>(payload.data()))) ++delivered_;
   }
 
   /// A part of a message that travels in pieces; `number` tells those of one message from those of
@@ -136,7 +134,7 @@ class Inbox {
       piece_end_ = 0;
       return;
     }
-    if (offset == 0) piece_stamp_ = load_u64(piece.data());
+    if (offset == 0) piece_stamp_ = load_le<std::uint64_t>(piece.data());
     piece_end_ = offset + piece.size();
     if (piece_end_ == total && take_stamp(piece_stamp_)) ++delivered_;
   }

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <string_view>
 #include <system_error>
 
 #include "net/socket.hpp"
@@ -12,13 +13,23 @@
 namespace gimnet::perf {
 namespace {
 
-std::int64_t status_bytes(pid_t process, const char* name) {
-  std::ifstream status("/proc/" + std::to_string(process) + "/status");
-  for (std::string word; status >> word;) {
-    std::int64_t kibibytes = 0;
-    if (word == name && status >> kibibytes) return kibibytes * 1024;
+/// The sum of the numbers behind words that end so, in a file of /proc; 0: it is gone.
+std::int64_t sum_in(const std::filesystem::path& status, std::string_view ending) {
+  std::ifstream file(status);
+  std::int64_t sum = 0;
+  for (std::string word; file >> word;) {
+    std::int64_t number = 0;
+    if (word.ends_with(ending) && file >> number) sum += number;
   }
-  fail("the measured process is gone");
+  return sum;
+}
+
+std::filesystem::path folder_of(pid_t process) { return "/proc/" + std::to_string(process); }
+
+std::int64_t memory_bytes(pid_t process, std::string_view name) {
+  const std::int64_t kibibytes = sum_in(folder_of(process) / "status", name);
+  if (kibibytes == 0) fail("the measured process is gone");
+  return kibibytes * 1024;
 }
 
 }  // namespace
@@ -35,14 +46,8 @@ std::int64_t cpu_time_ns(pid_t process) {
 std::int64_t context_switches(pid_t process) {
   std::error_code error;
   std::int64_t sum = 0;
-  for (const auto& thread :
-       std::filesystem::directory_iterator("/proc/" + std::to_string(process) + "/task", error)) {
-    std::ifstream status(thread.path() / "status");
-    for (std::string word; status >> word;) {
-      std::int64_t count = 0;
-      if (word.ends_with("voluntary_ctxt_switches:") && status >> count) sum += count;
-    }
-  }
+  for (const auto& thread : std::filesystem::directory_iterator(folder_of(process) / "task", error))
+    sum += sum_in(thread.path() / "status", "voluntary_ctxt_switches:");
   if (error) fail("the measured process is gone");
   return sum;
 }
@@ -51,7 +56,7 @@ CpuMeter::CpuMeter(pid_t process) : process_(process), begin_(read(process)) {}
 
 CpuMeter::Reading CpuMeter::read(pid_t process) {
   Reading reading{.all_ns = cpu_time_ns(process)};
-  std::ifstream file("/proc/" + std::to_string(process) + "/stat");
+  std::ifstream file(folder_of(process) / "stat");
   std::string word;
   std::getline(file, word, ')');  // the name may hold anything else
   // proc(5): utime and stime are the 14th and 15th field, the name is the second.
@@ -69,8 +74,8 @@ CpuMeter::Used CpuMeter::used() const {
   return {.user_ns = all_ns * (1 - system_share), .system_ns = all_ns * system_share};
 }
 
-std::int64_t resident_bytes(pid_t process) { return status_bytes(process, "VmRSS:"); }
+std::int64_t resident_bytes(pid_t process) { return memory_bytes(process, "VmRSS:"); }
 
-std::int64_t peak_resident_bytes(pid_t process) { return status_bytes(process, "VmHWM:"); }
+std::int64_t peak_resident_bytes(pid_t process) { return memory_bytes(process, "VmHWM:"); }
 
 }  // namespace gimnet::perf

@@ -4,18 +4,18 @@
 
 #include <cstdint>
 
-// What the measured process has used, as the kernel counts it. Ends the program when the process is
-// gone.
+// The use of time and memory by the measured process, as the kernel counts it. Ends the program
+// when the process is gone.
 
 namespace gimnet::perf {
 
 /// User and system time of the whole process, in nanoseconds.
 [[nodiscard]] std::int64_t cpu_time_ns(pid_t process);
-/// How often the threads that it has now were put on a processor or taken from it: those that do
-/// nothing are not.
+/// The number of times that its present threads were put on a processor or taken from it. Threads
+/// that do nothing are not.
 [[nodiscard]] std::int64_t context_switches(pid_t process);
 
-/// What a process has used since this was made, user and system time apart. The sum is exact; their
+/// The time of a process since this was made, user and system time apart. The sum is exact; their
 /// ratio is the kernel's, which with CONFIG_TICK_CPU_ACCOUNTING (Debian's too) looks at each tick
 /// whose it is, CONFIG_HZ times a second, and that is all it knows: getrusage() and cgroups tell
 /// the same. Few seconds say little of a small part.

@@ -13,7 +13,7 @@
 
 namespace gimnet::perf {
 
-/// What a run is asked to do.
+/// The order for a run.
 struct RunOptions {
   std::size_t payload_bytes = 16;
   std::chrono::nanoseconds duration{1'000'000'000};
@@ -21,7 +21,7 @@ struct RunOptions {
   std::size_t client_count = 0;  ///< of idle and connect_many; 0: the scenario's own
 };
 
-/// What a run found: names and numbers, printed as one JSON object.
+/// The results of a run: names and numbers, printed as one JSON object.
 class Findings {
  public:
   void add(std::string name, double value) { values_.emplace_back(std::move(name), value); }

@@ -9,11 +9,6 @@ namespace {
 
 constexpr std::chrono::milliseconds kWarmUp{150};
 
-struct Traffic {
-  std::vector<Publisher> publishers;
-  std::size_t recipients_a_message = 1;
-};
-
 struct Counts {
   std::uint64_t delivered = 0;
   std::uint64_t lost = 0;
@@ -33,8 +28,9 @@ Counts count_inboxes(Engine& engine) {
 
 /// Warms up, then measures from rest to rest, so that the processor time belongs to exactly the
 /// messages counted.
-Findings measure(Engine& engine, const RunOptions& options, Traffic traffic) {
-  Flood flood(engine, std::move(traffic.publishers), traffic.recipients_a_message);
+Findings measure(Engine& engine, const RunOptions& options, std::vector<Publisher> publishers,
+                 std::size_t recipients_a_message = 1) {
+  Flood flood(engine, std::move(publishers), recipients_a_message);
   flood.warm_up(std::min<std::chrono::nanoseconds>(kWarmUp, options.duration));
   const Counts before = count_inboxes(engine);
   const auto begin = Clock::now();
@@ -56,32 +52,36 @@ Findings measure(Engine& engine, const RunOptions& options, Traffic traffic) {
   return findings;
 }
 
+/// Client `to` gets messages of `stream`.
+Target expecting(Engine& engine, const RunOptions& options, std::size_t to, std::size_t stream) {
+  Client& client = engine.client(to);
+  client.inbox.expect(static_cast<StreamId>(stream), options.payload_bytes);
+  return {.recipients = {&client}, .stream = static_cast<StreamId>(stream)};
+}
+
+/// Client `from` sends to the targets in turns.
+Publisher publisher_of(Engine& engine, const RunOptions& options, std::size_t from,
+                       const std::vector<Target>& targets, Writing writing = Writing::batched) {
+  return {engine.wire(), engine.client(from), targets,
+          MessageShape{.payload_bytes = options.payload_bytes}, writing};
+}
+
 Findings pairs(Engine& engine, const RunOptions& options, std::size_t pair_count, Writing writing) {
   engine.connect(2 * pair_count);
-  Traffic traffic;
+  std::vector<Publisher> publishers;
   for (std::size_t pair = 0; pair < pair_count; ++pair) {
-    const auto stream = static_cast<StreamId>(pair);
-    Client& to = engine.client(2 * pair + 1);
-    to.inbox.expect(stream, options.payload_bytes);
-    const Target target{.kind = Target::Kind::unicast, .recipients = {&to}, .stream = stream};
-    traffic.publishers.emplace_back(engine.wire(), engine.client(2 * pair), std::vector{target},
-                                    MessageShape{.payload_bytes = options.payload_bytes}, writing);
+    const Target target = expecting(engine, options, 2 * pair + 1, pair);
+    publishers.push_back(publisher_of(engine, options, 2 * pair, {target}, writing));
   }
-  return measure(engine, options, std::move(traffic));
+  return measure(engine, options, std::move(publishers));
 }
 
 /// One message of client 0 to all others.
-Findings to_all(Engine& engine, const RunOptions& options, Target target,
+Findings to_all(Engine& engine, const RunOptions& options, const Target& target,
                 std::size_t recipient_count) {
-  for (std::size_t index = 1; index <= recipient_count; ++index) {
-    engine.client(index).inbox.expect(target.stream, options.payload_bytes);
-  }
-  Traffic traffic;
-  traffic.recipients_a_message = recipient_count;
-  traffic.publishers.emplace_back(engine.wire(), engine.client(0), std::vector{std::move(target)},
-                                  MessageShape{.payload_bytes = options.payload_bytes},
-                                  Writing::batched);
-  return measure(engine, options, std::move(traffic));
+  for (std::size_t index = 1; index <= recipient_count; ++index)
+    static_cast<void>(expecting(engine, options, index, target.stream));
+  return measure(engine, options, {publisher_of(engine, options, 0, {target})}, recipient_count);
 }
 
 }  // namespace
@@ -102,17 +102,9 @@ Findings in_turns(Engine& engine, const RunOptions& options) {
   constexpr std::size_t kDestinations = 8;
   engine.connect(1 + kDestinations);
   std::vector<Target> targets;
-  for (std::size_t index = 1; index <= kDestinations; ++index) {
-    const auto stream = static_cast<StreamId>(index);
-    Client& to = engine.client(index);
-    to.inbox.expect(stream, options.payload_bytes);
-    targets.push_back({.kind = Target::Kind::unicast, .recipients = {&to}, .stream = stream});
-  }
-  Traffic traffic;
-  traffic.publishers.emplace_back(engine.wire(), engine.client(0), targets,
-                                  MessageShape{.payload_bytes = options.payload_bytes},
-                                  Writing::batched);
-  return measure(engine, options, std::move(traffic));
+  for (std::size_t index = 1; index <= kDestinations; ++index)
+    targets.push_back(expecting(engine, options, index, index));
+  return measure(engine, options, {publisher_of(engine, options, 0, targets)});
 }
 
 Findings fan_out(Engine& engine, const RunOptions& options, std::size_t subscriber_count) {
@@ -127,7 +119,7 @@ Findings list_100(Engine& engine, const RunOptions& options) {
   Target target{.kind = Target::Kind::list, .recipients = {}};
   for (std::size_t index = 1; index <= kRecipients; ++index)
     target.recipients.push_back(&engine.client(index));
-  return to_all(engine, options, std::move(target), kRecipients);
+  return to_all(engine, options, target, kRecipients);
 }
 
 namespace {
@@ -156,7 +148,10 @@ class Stalling {
       : engine_(engine),
         options_(options),
         phase_(options.duration / (2 * kTurns)),
-        flood_(engine, publishers_of(engine, options), 1) {
+        flood_(
+            engine,
+            {publisher_of(engine, options, 0, {{.kind = Target::Kind::group, .recipients = {}}})},
+            1) {
     flood_.set_window(kWindowBytes);
     settle();
   }
@@ -194,14 +189,6 @@ class Stalling {
   [[nodiscard]] std::uint64_t missing() const { return flood_.missing(); }
 
  private:
-  static std::vector<Publisher> publishers_of(Engine& engine, const RunOptions& options) {
-    std::vector<Publisher> publishers;
-    publishers.emplace_back(engine.wire(), engine.client(0),
-                            std::vector{Target{.kind = Target::Kind::group, .recipients = {}}},
-                            MessageShape{.payload_bytes = options.payload_bytes}, Writing::batched);
-    return publishers;
-  }
-
   void settle() {
     flood_.run_for(std::min<std::chrono::nanoseconds>(phase_, kSettling));
     flood_.drain();

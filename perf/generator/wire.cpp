@@ -1,15 +1,19 @@
 #include "generator/wire.hpp"
 
+#include <sys/socket.h>
+#include <unistd.h>
+
 #include <algorithm>
+#include <cerrno>
 
 #include "net/socket.hpp"
+#include "proto/frame/fragment_header.hpp"
 
 namespace gimnet::perf {
 namespace {
 
 constexpr std::size_t kWholeBytesMax = 4 * 1024;
 constexpr std::size_t kPieceBytes = 32 * 1024;
-constexpr std::size_t kFragmentHeaderBytes = 12;
 constexpr std::uint32_t kHub = 7u << kIndexBits;
 
 void append_bytes(std::span<const std::byte> bytes, std::vector<std::byte>& to) {
@@ -18,10 +22,50 @@ void append_bytes(std::span<const std::byte> bytes, std::vector<std::byte>& to) 
 
 void append_u32(std::uint32_t value, std::vector<std::byte>& to) {
   to.resize(to.size() + sizeof(value));
-  store_u32(to.data() + to.size() - sizeof(value), value);
+  store_le(to.data() + to.size() - sizeof(value), value);
 }
 
 }  // namespace
+
+Client::~Client() { close(); }
+
+void Client::close() {
+  if (socket_ >= 0) ::close(socket_);
+  socket_ = -1;
+}
+
+bool Client::send_some(std::span<const std::byte>& bytes) {
+  const ssize_t sent = ::send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+  if (sent < 0) {
+    if (errno != EAGAIN && errno != EINTR) is_closed = true;
+    return false;
+  }
+  bytes = bytes.subspan(static_cast<std::size_t>(sent));
+  return bytes.empty();
+}
+
+bool Client::flush() {
+  if (is_closed) return false;
+  if (!begun_.empty() && !send_some(begun_)) return false;
+  if (control_.empty()) return true;
+  std::span<const std::byte> rest = std::span<const std::byte>(control_).subspan(control_sent_);
+  const bool all = send_some(rest);
+  control_sent_ = control_.size() - rest.size();
+  if (!all) return false;
+  control_.clear();
+  control_sent_ = 0;
+  return true;
+}
+
+bool Client::write(std::span<const std::byte> bytes) {
+  begun_ = bytes;
+  return send_some(begun_);
+}
+
+void Client::write_control(std::span<const std::byte> bytes) {
+  control_.insert(control_.end(), bytes.begin(), bytes.end());
+  flush();
+}
 
 std::uint32_t Wire::node_id(const Client& client) const {
   return kHub | static_cast<std::uint32_t>(client.index() + 1);
@@ -75,15 +119,16 @@ void Wire::append_message(const Client& from, const Target& target, std::uint8_t
   for (std::size_t offset = 0; offset < payload.size(); offset += piece_bytes) {
     const auto piece = payload.subspan(offset, std::min(piece_bytes, payload.size() - offset));
     header.length = static_cast<std::uint32_t>(
-        ids.size() * 4 + (is_whole ? 0 : kFragmentHeaderBytes) + piece.size());
+        ids.size() * 4 + (is_whole ? 0 : proto::kFragmentHeaderSize) + piece.size());
     bytes.resize(bytes.size() + proto::kHeaderSize);
     proto::store_header(bytes.data() + bytes.size() - proto::kHeaderSize, header);
     for (const std::uint32_t id : ids) append_u32(id, bytes);
     const std::size_t fragment_at = bytes.size();
     if (!is_whole) {
-      append_u32(0, bytes);
-      append_u32(static_cast<std::uint32_t>(offset), bytes);
-      append_u32(static_cast<std::uint32_t>(payload.size()), bytes);
+      bytes.resize(fragment_at + proto::kFragmentHeaderSize);
+      proto::store_fragment_header(bytes.data() + fragment_at,
+                                   {.offset = static_cast<std::uint32_t>(offset),
+                                    .total = static_cast<std::uint32_t>(payload.size())});
     }
     if (offset == 0) block.mark_stamp(bytes.size(), target.stream);
     if (!is_whole) block.mark_number(fragment_at);
@@ -114,10 +159,11 @@ void Wire::take_data(Client& client, const proto::FrameHeader& header,
   if (header.kind == proto::Kind::unicast && header.dst != node_id(client))
     return client.inbox.on_wrong();
   if (header.flags == 0) return client.inbox.on_message(body);
-  if (header.flags != proto::kFlagFragment || body.size() <= kFragmentHeaderBytes)
+  if (header.flags != proto::kFlagFragment || body.size() <= proto::kFragmentHeaderSize)
     return client.inbox.on_wrong();
-  client.inbox.on_piece(load_u32(body.data()), load_u32(body.data() + 4), load_u32(body.data() + 8),
-                        body.subspan(kFragmentHeaderBytes));
+  const auto fragment = proto::load_fragment_header(body.data());
+  client.inbox.on_piece(fragment.message, fragment.offset, fragment.total,
+                        body.subspan(proto::kFragmentHeaderSize));
 }
 
 void Wire::take_other(Client&, const proto::FrameHeader&, std::span<const std::byte>) {

@@ -24,7 +24,7 @@
 #include "tests/hub/shard/support/hub_rig.hpp"
 
 extern "C" {
-/// Where callgrind switches its counting on and off: never inlined, known by this name.
+/// Callgrind switches its counting on and off here: never inlined, known by this name.
 [[gnu::noinline]] void counted(const std::function<void()>& work) {
   work();
   asm volatile(
@@ -169,21 +169,40 @@ Work mailbox() {
 
 /// One turn of a whole shard: from a connection's bytes in memory to other connections' bytes in
 /// memory.
+Work turn_of(std::uint64_t frames, const std::shared_ptr<testing::HubRig>& rig,
+             testing::FakeNode& sender, const std::vector<std::byte>& bytes) {
+  return {frames, [rig, &sender, bytes] {
+            rig->write(sender, bytes);
+            rig->shard(0).turn(rig->ready(0), ++rig->now_ms);
+          }};
+}
+
+std::vector<testing::FakeNode*> join_members(testing::HubRig& rig) {
+  std::vector<testing::FakeNode*> members;
+  for (std::uint32_t i = 0; i < kFanOut; ++i) members.push_back(&rig.join(0));
+  return members;
+}
+
+/// So many frames in a row; `frame_of` makes the one of a number.
+template <class FrameOf>
+std::vector<std::byte> in_a_row(std::uint32_t frames, const FrameOf& frame_of) {
+  std::vector<std::byte> bytes;
+  for (std::uint32_t i = 0; i < frames; ++i) {
+    const auto frame = frame_of(i);
+    bytes.insert(bytes.end(), frame.begin(), frame.end());
+  }
+  return bytes;
+}
+
 Work hub_turn(std::uint32_t destinations) {
   auto rig = std::make_shared<testing::HubRig>();
   testing::FakeNode& sender = rig->join(0);
   for (std::uint32_t i = 0; i < destinations; ++i) rig->join(0);
   rig->settle();
-  std::vector<std::byte> bytes;
-  for (std::uint32_t i = 0; i < kFramesPerTurn; ++i) {
-    const auto frame =
-        testing::HubRig::frame(sender, sender.id.value() + 1 + i % destinations, kPayload);
-    bytes.insert(bytes.end(), frame.begin(), frame.end());
-  }
-  return {kFramesPerTurn, [rig, &sender, bytes] {
-            rig->write(sender, bytes);
-            rig->shard(0).turn(rig->ready(0), ++rig->now_ms);
-          }};
+  const auto frame_of = [&](std::uint32_t i) {
+    return testing::HubRig::frame(sender, sender.id.value() + 1 + i % destinations, kPayload);
+  };
+  return turn_of(kFramesPerTurn, rig, sender, in_a_row(kFramesPerTurn, frame_of));
 }
 
 /// Turns of one frame each: what a turn costs beside its frames, which is what a round trip feels.
@@ -207,23 +226,16 @@ Work hub_turn_single() {
 Work hub_turn_fan_out(std::uint32_t services) {
   auto rig = std::make_shared<testing::HubRig>();
   testing::FakeNode& provider = rig->join(0);
-  std::vector<testing::FakeNode*> members;
-  for (std::uint32_t i = 0; i < kFanOut; ++i) members.push_back(&rig->join(0));
+  const auto members = join_members(*rig);
   for (std::uint32_t service = 1; service <= services; ++service)
     rig->publish_group(service, provider.id, members);
   rig->settle();
   constexpr std::uint32_t kFrames = 32;
-  std::vector<std::byte> bytes;
-  for (std::uint32_t i = 0; i < kFrames; ++i) {
-    const auto group = testing::HubRig::group(1 + i % services);
-    const auto frame =
-        testing::HubRig::frame(provider, group, kPayload, {.kind = proto::Kind::group});
-    bytes.insert(bytes.end(), frame.begin(), frame.end());
-  }
-  return {kFrames * kFanOut, [rig, &provider, bytes] {
-            rig->write(provider, bytes);
-            rig->shard(0).turn(rig->ready(0), ++rig->now_ms);
-          }};
+  const auto frame_of = [&](std::uint32_t i) {
+    return testing::HubRig::frame(provider, testing::HubRig::group(1 + i % services), kPayload,
+                                  {.kind = proto::Kind::group});
+  };
+  return turn_of(kFrames * kFanOut, rig, provider, in_a_row(kFrames, frame_of));
 }
 
 /// A long run to members whose queues are full: for each of them as many messages go as come.
@@ -232,22 +244,16 @@ Work hub_turn_full() {
   limits.lane1_bytes = 40'000;
   auto rig = std::make_shared<testing::HubRig>(1, limits);
   testing::FakeNode& provider = rig->join(0);
-  std::vector<testing::FakeNode*> members;
-  for (std::uint32_t i = 0; i < kFanOut; ++i) members.push_back(&rig->join(0));
+  const auto members = join_members(*rig);
   rig->publish_group(1, provider.id, members);
   rig->settle();
   for (testing::FakeNode* member : members) member->pipe.set_room(0);
   const auto frame = testing::HubRig::frame(provider, testing::HubRig::group(1), kPayload,
                                             {.kind = proto::Kind::group});
-  std::vector<std::byte> bytes;
-  for (std::uint32_t i = 0; i < kFramesPerTurn; ++i)
-    bytes.insert(bytes.end(), frame.begin(), frame.end());
-  const auto turn = [rig, &provider, bytes] {
-    rig->write(provider, bytes);
-    rig->shard(0).turn(rig->ready(0), ++rig->now_ms);
-  };
-  for (int i = 0; i < 8; ++i) turn();
-  return {kFramesPerTurn * kFanOut, turn};
+  const auto bytes = in_a_row(kFramesPerTurn, [&](std::uint32_t) { return frame; });
+  Work work = turn_of(kFramesPerTurn * kFanOut, rig, provider, bytes);
+  for (int i = 0; i < 8; ++i) work.run();
+  return work;
 }
 
 /// The same to recipients by their ids: each frame brings its own.
@@ -263,16 +269,10 @@ Work hub_turn_list() {
   ids_and_payload += kPayload;
   rig->settle();
   constexpr std::uint32_t kFrames = 32;
-  std::vector<std::byte> bytes;
-  for (std::uint32_t i = 0; i < kFrames; ++i) {
-    const auto frame =
-        testing::HubRig::frame(sender, kFanOut, ids_and_payload, {.kind = proto::Kind::list});
-    bytes.insert(bytes.end(), frame.begin(), frame.end());
-  }
-  return {kFrames * kFanOut, [rig, &sender, bytes] {
-            rig->write(sender, bytes);
-            rig->shard(0).turn(rig->ready(0), ++rig->now_ms);
-          }};
+  const auto frame =
+      testing::HubRig::frame(sender, kFanOut, ids_and_payload, {.kind = proto::Kind::list});
+  const auto bytes = in_a_row(kFrames, [&](std::uint32_t) { return frame; });
+  return turn_of(kFrames * kFanOut, rig, sender, bytes);
 }
 
 struct Script {

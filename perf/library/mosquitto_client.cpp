@@ -46,10 +46,12 @@ class MosquittoClient final : public LibraryClient {
     mosquitto_subscribe_callback_set(mosquitto_, [](mosquitto*, void* self, int, int, const int*) {
       static_cast<MosquittoClient*>(self)->wake();
     });
-    const Endpoint endpoint = parse_endpoint(setup.url);
-    check(mosquitto_connect(mosquitto_, endpoint.host_or_path.c_str(), endpoint.port,
-                            kKeepAliveSeconds),
-          "connect");
+    // tcp://HOST:PORT, or unix:PATH with port 0.
+    const bool is_unix = setup.url.starts_with("unix:");
+    const std::size_t end = is_unix ? setup.url.size() : setup.url.rfind(':');
+    const std::string place = setup.url.substr(is_unix ? 5 : 6, end - (is_unix ? 5 : 6));
+    const int port = is_unix ? 0 : std::stoi(setup.url.substr(end + 1));
+    check(mosquitto_connect(mosquitto_, place.c_str(), port, kKeepAliveSeconds), "connect");
     check(mosquitto_subscribe(mosquitto_, nullptr, setup.own.c_str(), 0), "subscribe");
     if (!wait(Clock::now() + kPatience)) fail("the hub did not answer the subscription in time");
   }

@@ -16,13 +16,6 @@ void check(natsStatus status, const char* what) {
   if (status != NATS_OK) fail(std::string(what) + ": " + natsStatus_GetText(status));
 }
 
-/// The library knows nats://HOST:PORT.
-std::string nats_url(const std::string& url) {
-  const Endpoint endpoint = parse_endpoint(url);
-  if (endpoint.is_unix) fail("nats.c has no Unix sockets");
-  return "nats://" + endpoint.host_or_path + ":" + std::to_string(endpoint.port);
-}
-
 class NatsClient final : public LibraryClient {
  public:
   ~NatsClient() override {
@@ -33,9 +26,10 @@ class NatsClient final : public LibraryClient {
   void open(const Setup& setup, OnMessage on_message) override {
     on_message_ = std::move(on_message);
     partner_ = setup.partner;
+    if (!setup.url.starts_with("tcp://")) fail("nats.c has no Unix sockets");
     natsOptions* options = nullptr;
     check(natsOptions_Create(&options), "options");
-    check(natsOptions_SetURL(options, nats_url(setup.url).c_str()), "url");
+    check(natsOptions_SetURL(options, ("nats" + setup.url.substr(3)).c_str()), "url");
     check(natsOptions_SetSendAsap(options, !setup.is_bursty), "send at once");
     check(natsConnection_Connect(&connection_, options), "connect");
     natsOptions_Destroy(options);

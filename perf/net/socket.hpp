@@ -1,9 +1,9 @@
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
 #include <string>
 #include <string_view>
+
+#include "impair/address.hpp"
 
 // Sockets of the measuring programs. Every failure ends the program with a sentence: a measurement
 // that cannot be made has no result. Thread safety: none; one thread.
@@ -14,24 +14,18 @@ namespace gimnet::perf {
 /// left out.
 [[noreturn]] void fail(std::string_view what, int error = 0);
 
-/// An address as the hub prints it: `tcp://127.0.0.1:7450` or `unix:/path`.
-struct Endpoint {
-  bool is_unix = false;
-  std::string host_or_path;
-  std::uint16_t port = 0;
-};
+// Addresses are as the hub prints them: `tcp://127.0.0.1:7450` or `unix:/path`.
 
-/// Ends the program when `url` has neither form.
-[[nodiscard]] Endpoint parse_endpoint(std::string_view url);
-
+/// Ends the program when it is none.
+[[nodiscard]] impair::Address address_of(const std::string& url);
 /// A connected, non-blocking socket with TCP_NODELAY.
-[[nodiscard]] int connect_to(const Endpoint& endpoint);
+[[nodiscard]] int connect_to(const impair::Address& address);
 /// A listening, non-blocking socket with the longest backlog that the system allows.
-[[nodiscard]] int listen_on(const Endpoint& endpoint);
-/// The address that a listening socket really has, as a URL.
-[[nodiscard]] std::string local_url(int listener, const Endpoint& endpoint);
-/// Sets TCP_NODELAY where the socket is TCP, and SO_SNDBUF unless `send_buffer_bytes` is 0.
-void tune(int socket, const Endpoint& endpoint, int send_buffer_bytes);
+[[nodiscard]] int listen_on(const std::string& url);
+/// The address that a listening socket really has.
+[[nodiscard]] std::string local_url(int listener, const std::string& url);
+/// Sets TCP_NODELAY if the socket is TCP, and SO_SNDBUF unless `send_buffer_bytes` is 0.
+void tune(int socket, int send_buffer_bytes);
 /// Lets this process hold as many descriptors as its hard limit allows.
 void raise_descriptor_limit();
 

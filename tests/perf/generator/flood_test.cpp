@@ -6,6 +6,7 @@
 
 #include <array>
 #include <optional>
+#include <string>
 #include <thread>
 
 #include "generator/wire.hpp"
@@ -66,10 +67,10 @@ class FloodTest : public testing::Test {
     engine_.set_patience(kPatience);
   }
 
-  const Endpoint asked_ = parse_endpoint("tcp://127.0.0.1:0");
+  const std::string asked_ = "tcp://127.0.0.1:0";
   const int listener_ = listen_on(asked_);
   Wire wire_;
-  Engine engine_{wire_, parse_endpoint(local_url(listener_, asked_))};
+  Engine engine_{wire_, local_url(listener_, asked_)};
   std::optional<Flood> flood_;
   int from_ = -1;
   int to_ = -1;

@@ -19,7 +19,7 @@ void append(MessageBlock& block, StreamId stream) {
 }
 
 std::uint64_t stamp_of(const MessageBlock& block, std::size_t index) {
-  return load_u64(block.bytes.data() + index * kMessageBytes + kStampAt);
+  return load_le<std::uint64_t>(block.bytes.data() + index * kMessageBytes + kStampAt);
 }
 
 TEST(MessageBlock, NumbersEachStreamByItself) {
@@ -42,10 +42,10 @@ TEST(MessageBlock, NeverRepeatsAMessageNumber) {
   append(block, 1);
   append(block, 2);
   block.renew();
-  EXPECT_EQ(load_u32(block.bytes.data()), 1u);
-  EXPECT_EQ(load_u32(block.bytes.data() + kMessageBytes), 2u);
+  EXPECT_EQ(load_le<std::uint32_t>(block.bytes.data()), 1u);
+  EXPECT_EQ(load_le<std::uint32_t>(block.bytes.data() + kMessageBytes), 2u);
   block.renew();
-  EXPECT_EQ(load_u32(block.bytes.data()), 3u);
+  EXPECT_EQ(load_le<std::uint32_t>(block.bytes.data()), 3u);
 }
 
 TEST(MessageBlock, KnowsWhereMessagesEnd) {
@@ -66,7 +66,7 @@ std::vector<std::byte> message(std::uint64_t sequence, StreamId stream = kStream
                                std::size_t size = kBytes) {
   const auto pattern = pattern_payload(size);
   std::vector<std::byte> payload(pattern.begin(), pattern.end());
-  store_u64(payload.data(), make_stamp(stream, sequence));
+  store_le(payload.data(), make_stamp(stream, sequence));
   return payload;
 }
 

@@ -64,7 +64,8 @@ TEST_F(WireTest, ListsItsRecipientsInOrder) {
   EXPECT_EQ(header.kind, proto::Kind::list);
   EXPECT_EQ(header.dst, 2u);
   EXPECT_EQ(header.length, 8u + 16u);
-  EXPECT_LT(load_u32(block.bytes.data() + 16), load_u32(block.bytes.data() + 20));
+  EXPECT_LT(load_le<std::uint32_t>(block.bytes.data() + 16),
+            load_le<std::uint32_t>(block.bytes.data() + 20));
 }
 
 TEST_F(WireTest, PublishesWholeMessagesOnly) {
