@@ -9,7 +9,6 @@
 
 #include "base/id_text.hpp"
 #include "client/nif/api.hpp"
-#include "client/nif/ask.hpp"
 #include "client/nif/record_list.hpp"
 #include "client/nif/sized_struct.hpp"
 #include "proto/control/names.hpp"

@@ -3,7 +3,6 @@
 #include <string>
 
 #include "client/nif/api.hpp"
-#include "client/nif/ask.hpp"
 #include "proto/control/ns_register.hpp"
 #include "proto/control/ns_watch.hpp"
 
