@@ -29,7 +29,7 @@
 // turns any into throwing. Thread safety: every function of every class may be called from any
 // thread at any time, on one object from many. Lifetime: Senders, Publishers, Subscriptions, Queues
 // and Watches are handles that can be copied and may outlive their Node; when it is closed they
-// answer Status::closed. Where no connection will come any more (the node was kicked, or replaced
+// answer Status::closed. If no connection will come any more (the node was kicked, or replaced
 // by another connection of its session, or does not reconnect) everything answers Status::refused
 // or, without reconnecting, Status::not_connected, and the sentence says why; what was received
 // before still comes. Moving: what was moved from may only be destroyed or assigned to; a Node may
@@ -75,7 +75,7 @@ class Queue {
   std::shared_ptr<gimi::MessageQueue> queue_;
 };
 
-/// What became of the messages of one stream.
+/// The fate of the messages of one stream.
 struct SendCounts {
   std::uint64_t sent = 0;
   std::uint64_t acknowledged = 0;
@@ -92,7 +92,7 @@ struct SendCounts {
 /// Senders of one (peer, key), or of one service, of a node are one stream: they share sequence,
 /// window and counts; the options of the first hold. One to a service follows it: while nobody has
 /// the service, send() answers not_found; when it is back, under whichever node and group, messages
-/// go there. What was not acknowledged at its former place counts as lost.
+/// go there. Messages not acknowledged at its former place count as lost.
 class Sender {
  public:
   /// Sends 0 bytes to 1 GiB. Ok: it is on its way; of a synchronized stream, settle() and counts()
@@ -118,7 +118,7 @@ class Sender {
   std::shared_ptr<gimi::SendStream> stream_;
 };
 
-/// How long Publisher::publish() waits if nobody says otherwise: a loop that steers something must
+/// The wait of Publisher::publish() if nobody says otherwise: a loop that steers something must
 /// not stand still for as long as its hub is away, and what it would have said is old by then.
 inline constexpr Timeout kPublishTimeout{1000};
 
@@ -137,7 +137,7 @@ class Publisher {
   Outcome<void> publish(BytesView data, More more) const {
     return publish(data, kPublishTimeout, more);
   }
-  /// How many there are, as the hub told last.
+  /// Their number, as the hub told last.
   [[nodiscard]] std::size_t subscribers() const;
   /// Waits until there are that many. Errors: timeout, closed.
   Outcome<void> wait_for_subscribers(std::size_t count, Timeout timeout = kForever) const;
@@ -166,7 +166,7 @@ class Subscription {
   /// As Queue::receive() and Queue::try_receive().
   Outcome<Message> receive(Timeout timeout = kForever) const;
   [[nodiscard]] std::optional<Message> try_receive() const;
-  /// Where its messages wait. The subscription lasts as long as this queue is held.
+  /// The queue of its messages. The subscription lasts as long as this queue is held.
   [[nodiscard]] Queue queue() const;
   /// Is there a provider at the moment?
   [[nodiscard]] bool exists() const;
@@ -189,8 +189,8 @@ class Subscription {
   std::shared_ptr<gimi::SubscribedService> service_;
 };
 
-/// What there is and what changes under a pattern of names. What is not taken waits at the hub,
-/// which tells a watch that is too far behind all from the start again. Copies are the same watch;
+/// The present and the changes under a pattern of names. Events not taken wait at the hub, which
+/// tells a watch that is too far behind all from the start again. Copies are the same watch;
 /// with the last one it ends, as a Publisher does.
 class Watch {
  public:
@@ -268,8 +268,8 @@ class Node {
   /// Messages dropped because of too many keys, or because they were no GIMI messages.
   [[nodiscard]] std::uint64_t dropped() const;
   /// Messages to this node, or of its subscriptions, that were lost on their way, as far as it
-  /// knows, and who filled its queue at the hub if that was full. What a service left out for this
-  /// node is counted by Subscription::missed().
+  /// knows, and who filled its queue at the hub if that was full. Subscription::missed() counts the
+  /// messages that a service left out for this node.
   [[nodiscard]] LostCounts lost() const;
 
   // ---- services
@@ -322,8 +322,8 @@ class Node {
   /// Services whose full name matches, ascending group ids.
   Outcome<std::vector<ServiceRecord>> services(std::string_view pattern = {},
                                                Timeout timeout = Timeout{5000}) const;
-  /// What the hub is, what its io threads counted, who is connected where (ascending ids), and
-  /// which hubs it knows (docs/operations.md).
+  /// The hub itself, the counters of its io threads, its connections (ascending ids), and the hubs
+  /// that it knows (docs/operations.md).
   Outcome<HubRecord> hub(Timeout timeout = Timeout{5000}) const;
   Outcome<std::vector<ShardCounts>> hub_counters(Timeout timeout = Timeout{5000}) const;
   Outcome<std::vector<ConnectionRecord>> hub_connections(Timeout timeout = Timeout{5000}) const;

@@ -41,8 +41,8 @@
  * structure of its own. nif_watched, nif_reply and the lists are made by the library alone and may
  * get members at their end: read them where the library has put them, and do not copy them.
  *
- * What travels on the wire is in docs/protocol.md; how this library uses it, and why, in
- * docs/nif.md.
+ * docs/protocol.md describes the bytes on the wire, docs/nif.md how this library uses them, and
+ * why.
  */
 
 #include <stddef.h>
@@ -92,7 +92,7 @@ typedef enum nif_resume {
 
 struct nif_incoming;
 
-/** What a delivery callback did with what it was given. */
+/** The answer of a delivery callback: what it did with a message or event. */
 typedef enum nif_verdict {
   NIF_DONE = 0,   /**< Seen to; the library releases it. */
   NIF_KEEP = 1,   /**< Kept; the program calls nif_release() on its copy of the nif_incoming later,
@@ -107,7 +107,7 @@ typedef enum nif_verdict {
  */
 typedef nif_verdict (*nif_callback)(void* user, const struct nif_incoming* in);
 
-/** How to connect. Zero members mean the default. */
+/** The options of connecting. Zero members mean the default. */
 typedef struct nif_options {
   size_t struct_size; /**< sizeof(nif_options). */
   /** `tcp://host:port` or `unix:/path`. NULL or "": the environment's GIMNET_HUB; where that is not
@@ -117,7 +117,7 @@ typedef struct nif_options {
   const char* url;
   const char* name; /**< Name to register, NULL or "": a node without a name, found by id only. */
   const char* description; /**< For people, at most 256 bytes. */
-  /** How long nif_connect() may take altogether, finding the host's address included. 0: 5,000;
+  /** The longest time of nif_connect(), finding the host's address included. 0: 5,000;
    * NIF_FOREVER, or any negative time: as long as it takes. */
   int32_t connect_timeout_ms;
   /** Not 0: nif_connect() dials again until connect_timeout_ms is over if there is no hub yet. */
@@ -155,8 +155,8 @@ typedef struct nif_options {
   void* user; /**< Given to the callback unchanged. */
   /** Not 0: keep the session token in memory only. Otherwise the token of a node with a name stands
    * in a file of the user's runtime folder while the node lives, so that the program has its id and
-   * name again at once when it crashed and is started anew (docs/nif.md, "Tokens"). Where the file
-   * cannot be had the node is connected all the same. */
+   * name again at once when it crashed and is started anew (docs/nif.md, "Tokens"). Without
+   * the file the node is connected all the same. */
   uint8_t no_token_file;
   /** A message of a service with delivery sync(n) counts as taken when nif_receive() gave it out or
    * the callback took it. Not 0: only nif_credit() says so, but for what the callback answered
@@ -169,7 +169,7 @@ typedef struct nif_options {
    * give it to a hub that lost it, without a GIMI header. Default 16 MiB: as much as a hub keeps
    * itself. A hub that was told to keep more (`retained_message_bytes`) loses larger ones when it
    * is started again, unless this is as large. At most 64 MiB, which all services of the handle
-   * have together. What is not kept is counted (nif_counters.last_messages_not_kept). */
+   * have together. Messages not kept are counted (nif_counters.last_messages_not_kept). */
   uint32_t last_message_bytes;
 } nif_options;
 
@@ -183,7 +183,7 @@ nif_status nif_connect(const nif_options* options, nif_node** node);
 
 /** Leaves for good: writes what still waits (for at most one second), says GOODBYE, so that name
  * and id are free at once, and frees the handle. Calls of other threads that wait on it return
- * NIF_CLOSED first. What was received and not released stays valid. NIF_CLOSED: no such handle.
+ * NIF_CLOSED first. Messages received and not released stay valid. NIF_CLOSED: no such handle.
  * NIF_IN_CALLBACK: called from this handle's callback. */
 nif_status nif_close(nif_node* node);
 
@@ -197,7 +197,7 @@ typedef struct nif_info {
   uint8_t resume;           /**< 1: both ends keep what is unconfirmed. */
   uint8_t replaced;         /**< 1: see NIF_REPLACED. */
   uint8_t keep_alive_seen;  /**< 1: round_trip_ns and clock_offset_ns hold a measurement. */
-  uint32_t reconnects;      /**< How often the connection was made again. */
+  uint32_t reconnects;      /**< Times that the connection was made again. */
   int64_t round_trip_ns;    /**< To the hub and back, by the last keep-alive. */
   int64_t clock_offset_ns;  /**< Hub's clock minus this one, by the best of the last keep-alives. */
   uint32_t frame_bytes_max; /**< Largest frame length in use. */
@@ -241,7 +241,7 @@ typedef enum nif_lane {
   NIF_BACKGROUND = 3
 } nif_lane;
 
-/** What happens to the message at a full queue (docs/protocol.md, section 5). */
+/** The fate of the message at a full queue (docs/protocol.md, section 5). */
 typedef enum nif_policy {
   NIF_POLICY_DEFAULT =
       0,         /**< BLOCK for UNICAST and SERVICE; else the oldest waiting message goes. */
@@ -255,7 +255,7 @@ typedef enum nif_policy {
 enum {
   NIF_FLAG_REPORT = 0x01, /**< Deliver a NIF_REPORT if the message does not arrive. */
   NIF_FLAG_KEYED = 0x02,  /**< nif_outgoing.key is part of the message. */
-  /** More messages follow at once: do not write yet. What waits is written with the next message
+  /** More messages follow at once: do not write yet. They are written with the next message
    * without this flag, at 64 KiB, by nif_flush(), and at the latest with the next keep-alive. */
   NIF_FLAG_MORE = 0x04
 };
@@ -311,11 +311,11 @@ typedef struct nif_outgoing {
  * KiB, UNICAST) opens no window, and, where a session can be taken up again, while the connection
  * is broken. Waiting holds up no other destination.
  *
- *  The message is taken whole or not at all. Where the time is over when it has begun, the library
+ *  The message is taken whole or not at all. If the time is over when it has begun, the library
  * keeps a copy of the rest and goes on to send it: of one such message of any size, or of several
  * that have at most send_queue_bytes together. A further one of over 8 KiB waits for them, unless
- * its time is NIF_FOREVER. What becomes of the rest only reports tell (NIF_FLAG_REPORT), and
- * nif_drain().
+ * its time is NIF_FOREVER. Only reports (NIF_FLAG_REPORT) and nif_drain() tell the fate of
+ * the rest.
  *
  *  NIF_TIMEOUT: nothing was sent. NIF_NOT_CONNECTED: broken, and not dialing again or no resume.
  * NIF_REPLACED. NIF_TOO_LARGE: over 1 GiB, or refused by the receiver. NIF_NOT_DELIVERED: a
@@ -342,8 +342,8 @@ nif_status nif_drain(nif_node* node, int32_t timeout_ms);
 
 /* ---------------------------------------------------------------- receiving */
 
-/** What nif_receive() and the callback deliver. In brackets: the members that are set beside
- * `type`. */
+/** The messages and events of nif_receive() and the callback. In brackets: the members that are
+ * set beside `type`. */
 typedef enum nif_incoming_type {
   /** A message [from, to, kind, lane, flags, key, payload, extensions]. */
   NIF_MESSAGE = 0,
@@ -353,7 +353,7 @@ typedef enum nif_incoming_type {
    * KiB those bytes are as if it had come in one frame without a fragment header, as long as it is
    * among the last 1,024 such messages that asked for reports or have over 1 MiB. Hubs merge
    * reports: a program that ever asked for one gets those of messages over 1 MiB that did not, too.
-   * One with NIF_DROP_NOT_RETAINED comes without being asked for, and nothing was lost. Where the
+   * One with NIF_DROP_NOT_RETAINED comes without being asked for, and nothing was lost. If the
    * last frame was the library's own, which asked whether a receiver is still there,
    * `kind` is 7 (TAKEN), and of the `count` messages before it only the reason is known. */
   NIF_REPORT = 1,
@@ -376,10 +376,10 @@ typedef enum nif_incoming_type {
   NIF_DISCONNECTED = 4,
   /** Another connection took the session over; nothing follows [text]. */
   NIF_SESSION_REPLACED = 5,
-  /** How many subscribers a service of this node has now [group, count]: whenever some came or
+  /** The number of subscribers of a service of this node [group, count]: whenever some came or
    * went, and once when it was declared again after a break. */
   NIF_SUBSCRIBERS = 6,
-  /** What a service that this node subscribed is now: it appeared, has another provider or group
+  /** A service that this node subscribed changed: it appeared, has another provider or group
    * id, or went [text: full name, group (0: none; with a reason, nif_status: the hub refused the
    * subscription after a break, payload: its words), from: its provider (0: nobody), count: the
    * provider's session, message_type, instance, delivery, direction]. Comes before the first
@@ -447,8 +447,8 @@ typedef struct nif_incoming {
   void* storage;              /**< The library's; do not touch. */
 } nif_incoming;
 
-/** Takes the next message or event. NIF_TIMEOUT: none within timeout_ms. What was received before
- * the connection broke still comes, then NIF_NOT_CONNECTED (with no_reconnect) or NIF_REPLACED.
+/** Takes the next message or event. NIF_TIMEOUT: none within timeout_ms. Those received before the
+ * connection broke still come, then NIF_NOT_CONNECTED (with no_reconnect) or NIF_REPLACED.
  * NIF_BAD_ARGUMENT if a callback was set. */
 nif_status nif_receive(nif_node* node, nif_incoming* in, int32_t timeout_ms);
 

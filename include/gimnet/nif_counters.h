@@ -1,7 +1,7 @@
 #ifndef GIMNET_NIF_COUNTERS_H
 #define GIMNET_NIF_COUNTERS_H
 
-/* What the library counts. Included by gimnet/nif.h. */
+/* The counters of the library. Included by gimnet/nif.h. */
 
 #include <stddef.h>
 #include <stdint.h>
@@ -12,7 +12,7 @@
 extern "C" {
 #endif
 
-/** What this library counted for one handle since nif_connect(). */
+/** The counters of one handle since nif_connect(). */
 typedef struct nif_counters {
   size_t struct_size;         /**< sizeof(nif_counters), set by the caller. */
   uint64_t messages_sent;     /**< nif_send() calls that sent a message. */
@@ -34,7 +34,7 @@ typedef struct nif_counters {
   uint64_t send_queue_bytes;    /**< Waiting to be written now. */
   uint64_t retained_bytes;      /**< Waiting to be confirmed now. */
   uint64_t
-      read_stops; /**< How often the library stopped reading because the receive queue was full. */
+      read_stops; /**< Times that the library stopped reading because the receive queue was full. */
   /** Messages of own services with `retain` that the library did not keep for a hub that loses
    * them: over nif_options.last_message_bytes or, with those of the other services, over 64 MiB; or
    * no memory. */

@@ -57,7 +57,7 @@ nif_status nif_list_nodes(nif_node* node, const char* pattern, nif_node_list** l
 void nif_free_nodes(nif_node_list* list);
 
 typedef enum nif_direction { NIF_PROVIDES = 0, NIF_ACCEPTS = 1 } nif_direction;
-/** What a subscriber gets: every message; only the newest of those that wait; or, of sync(n), at
+/** The messages that a subscriber gets: all; only the newest of those that wait; or, of sync(n), at
  * most n that it has not taken, its hub holding the newest for it. */
 typedef enum nif_delivery {
   NIF_STREAM_DELIVERY = 0,
@@ -126,7 +126,7 @@ nif_status nif_list_services(nif_node* node, const char* pattern, nif_service_li
                              int32_t timeout_ms);
 void nif_free_services(nif_service_list* list);
 
-/** What a subscription stands for at the moment. */
+/** The state of a subscription at the moment. */
 typedef struct nif_subscription {
   uint32_t group; /**< 0: there is no such service yet; NIF_SERVICE_MOVED comes when there is. */
   uint32_t message_type;
@@ -141,7 +141,7 @@ typedef struct nif_subscription {
   uint64_t session;  /**< Of the provider: tells one program from the next under that id. */
 } nif_subscription;
 
-/** How much of a service a subscriber wants. Members that are 0 ask for nothing. */
+/** The part of a service that a subscriber wants. Members that are 0 ask for nothing. */
 typedef struct nif_pace {
   size_t struct_size; /**< sizeof(nif_pace). */
   uint32_t window;    /**< Of sync(n): fewer than n untaken messages. */

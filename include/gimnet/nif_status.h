@@ -1,7 +1,7 @@
 #ifndef GIMNET_NIF_STATUS_H
 #define GIMNET_NIF_STATUS_H
 
-/* What the calls of NIF answer, and why messages did not arrive. Included by gimnet/nif.h. */
+/* The answers of NIF's calls, and reasons for messages not to arrive. Included by gimnet/nif.h. */
 
 #ifdef __cplusplus
 extern "C" {
@@ -56,7 +56,7 @@ const char* nif_status_text(nif_status status);
 /** Longest sentence of nif_error_text() in bytes, without the terminating NUL. */
 #define NIF_SENTENCE_BYTES_MAX 1024
 
-/** What went wrong in the last call of this thread that did not answer NIF_OK or NIF_TIMEOUT: what
+/** A sentence about the last call of this thread that did not answer NIF_OK or NIF_TIMEOUT: what
  * happened, to what, what to do, in UTF-8. Never NULL. A longer one than NIF_SENTENCE_BYTES_MAX is
  * cut between two characters. Valid until: the next nif_* call of this thread. */
 const char* nif_error_text(void);

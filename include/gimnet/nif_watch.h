@@ -26,7 +26,7 @@ nif_status nif_unregister(nif_node* node, int32_t timeout_ms);
 
 /* ---------------------------------------------------------------- watching */
 
-/** What a watch is about: a set of bits. */
+/** The subjects of a watch: a set of bits. */
 typedef enum nif_subjects {
   NIF_WATCH_NODES = 1,
   NIF_WATCH_SERVICES = 2,
@@ -36,9 +36,9 @@ typedef enum nif_subjects {
   NIF_WATCH_BY_HAND = 0x100
 } nif_subjects;
 
-/** What a nif_watched tells; unknown ones of later versions are to be skipped. */
+/** The kinds of nif_watched; unknown ones of later versions are to be skipped. */
 typedef enum nif_change {
-  NIF_SNAPSHOT_BEGINS = 0, /**< What was told of this watch before is void: once at its beginning,
+  NIF_SNAPSHOT_BEGINS = 0, /**< Everything told of this watch before is void: once at its beginning,
                               and later whenever it was too far behind to be told each change. */
   NIF_PRESENT = 1,         /**< Part of the snapshot [node or service]. */
   NIF_SNAPSHOT_ENDS = 2,   /**< All that is there was told; changes follow. */
@@ -54,11 +54,11 @@ typedef enum nif_change {
                            text says why. */
 } nif_change;
 
-/** What changed, or is there. */
+/** A node or service that changed, or is there. */
 typedef struct nif_watched {
   uint32_t watch;
   uint32_t change; /**< nif_change. */
-  uint32_t hub_id; /**< Whose nodes and services these are. */
+  uint32_t hub_id; /**< The hub of these nodes and services. */
   uint64_t epoch;  /**< Of that hub's versions: another one after it was started again. */
   uint64_t version;
   const nif_node_record* node;       /**< NULL: it is not about a node. */
@@ -86,7 +86,7 @@ nif_status nif_watch_again(nif_node* node, uint32_t watch, int32_t timeout_ms);
  * begins to count anew. */
 nif_status nif_watch_taken(nif_node* node, uint32_t watch);
 
-/** Ends a watch. NIF_NOT_FOUND. What was received before still comes. */
+/** Ends a watch. NIF_NOT_FOUND. Events received before still come. */
 nif_status nif_unwatch(nif_node* node, uint32_t watch, int32_t timeout_ms);
 
 #ifdef __cplusplus

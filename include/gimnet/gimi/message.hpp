@@ -25,7 +25,7 @@ struct Peer {
   friend constexpr auto operator<=>(const Peer&, const Peer&) = default;
 };
 
-/// What a message is: which queue of its receiver it belongs to. The numbers, any of 32 bits, are
+/// The kind of a message: it selects a queue of the receiver. The numbers, any of 32 bits, are
 /// the application's.
 struct MessageKey {
   std::uint32_t type = 0;
@@ -85,7 +85,7 @@ class Message {
   }
   [[nodiscard]] std::size_t size() const { return data_.size(); }
 
-  /// Who sent it: the first hub vouches for it.
+  /// Its sender: the first hub vouches for it.
   [[nodiscard]] Peer from() const { return from_; }
   [[nodiscard]] MessageKey key() const { return key_; }
   [[nodiscard]] Lane lane() const { return lane_; }
@@ -106,8 +106,8 @@ class Message {
   [[nodiscard]] std::optional<std::int64_t> sent_ns() const { return sent_ns_; }
   /// When it was read from the network, by this machine's clock in ns since 1970.
   [[nodiscard]] std::int64_t arrival_ns() const { return arrival_ns_; }
-  /// How often its node had connected anew when it came, as NodeState::reconnects: where it grows
-  /// from one message to the next the connection to the hub was broken between them.
+  /// NodeState::reconnects of its node when it came: if it grows from one message to the next, the
+  /// connection to the hub was broken between them.
   [[nodiscard]] std::uint32_t reconnects() const { return reconnects_; }
   /// Full name of the service it was published by; "" for one that was sent to this node.
   [[nodiscard]] std::string_view service() const {

@@ -16,8 +16,8 @@ inline constexpr std::size_t kWindowMax = 64;
 /// Most payload bytes of them. A message that would be more, of any size, goes when no other waits
 /// for its ACK: where the sender does not wait (AtFullWindow) or several threads send, small ones
 /// can keep it from going. The receiver's library holds NodeOptions::receive_bytes for a program
-/// that stands still: 16 such windows by default. What comes beyond waits in its hub, which does
-/// not hold it for ever.
+/// that stands still: 16 such windows by default. More messages wait in its hub, which does not
+/// hold them for ever.
 inline constexpr std::size_t kWindowBytesMax = std::size_t{1} << 20;
 /// Messages that a queue keeps if nobody says otherwise.
 inline constexpr std::size_t kQueueMessagesDefault = 64;
@@ -27,7 +27,7 @@ inline constexpr std::size_t kQueueMessagesMax = std::size_t{1} << 24;
 // Every member has an initialiser, so that `{.window = 1}` names what is meant and no compiler
 // misses the others.
 
-/// How to join. Everything has a default that works on one machine.
+/// The options of joining. Everything has a default that works on one machine.
 struct NodeOptions {
   /// At most 255 bytes: up to 16 parts of A-Z a-z 0-9 . _ -, separated by `/`. "": a node without a
   /// name, found by its id only.
@@ -67,7 +67,7 @@ struct NodeOptions {
   std::uint32_t last_message_bytes = std::uint32_t{16} << 20;
 };
 
-/// What a queue does when a message comes and it is full.
+/// The behaviour of a full queue when a message comes.
 enum class AtFullQueue : std::uint8_t {
   overwrite_oldest,  ///< a ring buffer: the oldest goes and is counted; of size 1 it holds the
                      ///< newest
@@ -83,7 +83,7 @@ struct QueueOptions {
   AtFullQueue at_full = AtFullQueue::overwrite_oldest;
 };
 
-/// What a sender does when as much as its window allows is not acknowledged.
+/// The behaviour of a sender when as much as its window allows is not acknowledged.
 enum class AtFullWindow : std::uint8_t {
   wait,         ///< until there is room, at most the time given to send()
   skip,         ///< send nothing and answer Status::window_full
@@ -91,7 +91,7 @@ enum class AtFullWindow : std::uint8_t {
                 ///< room
 };
 
-/// How much of a service a subscriber wants. The program takes a message when it fetches it from
+/// A subscriber's share of a service. The program takes a message when it fetches it from
 /// the queue, or when the queue overwrites it.
 struct PaceOptions {
   std::uint32_t window =
@@ -139,7 +139,7 @@ struct AcceptOptions {
   std::string metadata{};  ///< for people and tools, at most 4,096 bytes of UTF-8
 };
 
-/// What a watch is about.
+/// The subjects of a watch.
 struct WatchOptions {
   bool nodes = true;
   bool services = true;

@@ -10,7 +10,7 @@
 
 namespace gimnet {
 
-/// How long a call may wait. 0 does not wait; kForever (any negative time) waits without a limit.
+/// The longest wait of a call. 0 does not wait; kForever (any negative time) waits without a limit.
 using Timeout = std::chrono::milliseconds;
 inline constexpr Timeout kForever{-1};
 inline constexpr Timeout kNoWait{0};
@@ -82,7 +82,7 @@ struct Failure {
   std::string sentence;
 };
 
-/// What the throwing forms of the API throw.
+/// The exception of the throwing forms of the API.
 class GimnetError : public std::runtime_error {
  public:
   explicit GimnetError(Failure failure)

@@ -9,11 +9,11 @@
 
 #include "gimnet/gimi/message.hpp"
 
-// What a hub tells about itself, its nodes and its services. Value types.
+// The records of a hub, its nodes and its services. Value types.
 
 namespace gimnet {
 
-/// What a subscriber gets: `stream` every message, in order, the oldest going when its queue at the
+/// A way to deliver: `stream` every message, in order, the oldest going when its queue at the
 /// hub is full; `latest` only the newest of those that wait; `sync` at most a window of messages
 /// that it has not taken, its hub holding the newest meanwhile, so that each subscriber gets fresh
 /// ones at its own rate.
@@ -48,11 +48,11 @@ struct ServiceRecord {
   bool retain = false;       ///< a new subscriber gets the last message first
 };
 
-/// What a watch tells.
+/// The kinds of events of a watch.
 enum class Change : std::uint8_t {
   snapshot_begins =
-      0,        ///< what was told before is void: at first, and when the watch was too far behind
-  present = 1,  ///< part of the snapshot
+      0,              ///< all told before is void: at first, and when the watch was too far behind
+  present = 1,        ///< part of the snapshot
   snapshot_ends = 2,  ///< all that is there was told; changes follow
   joined = 3,
   left = 4,  ///< a node, for good: only its id, name and hub id are told

@@ -5,7 +5,7 @@
 
 namespace gimnet::nif {
 
-/// What a status of the wire is in C.
+/// A status of the wire, in C.
 [[nodiscard]] constexpr nif_status status_of(proto::Status status) {
   switch (status) {
     case proto::Status::done:

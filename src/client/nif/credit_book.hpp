@@ -11,7 +11,7 @@
 
 namespace gimnet::nif {
 
-/// How many messages the program took of each group that its hub counts, told to the hub in
+/// Counts of messages that the program took of each group that its hub counts, told to the hub in
 /// CREDITs: totals, which are repeated after every WELCOME, so that none is lost (docs/protocol.md,
 /// section 8). Both ends count from the answer to the SUBSCRIBE that began the subscription, or
 /// from the SERVICE_MOVED that gave it a new group, and anew from a WELCOME that was not `resumed`.
@@ -31,7 +31,7 @@ class CreditBook {
   void open(GroupId group, std::uint32_t window, std::uint8_t number) GIMNET_EXCLUDES(mutex_);
   /// The subscription is over, or has another group.
   void forget(GroupId group) GIMNET_EXCLUDES(mutex_);
-  /// What a message of the group that comes now is tagged with; 0: it is not counted.
+  /// The tag of a message of the group that comes now; 0: it is not counted.
   [[nodiscard]] std::uint32_t epoch_for(std::uint32_t group) GIMNET_EXCLUDES(mutex_);
 
   /// The program took messages. With `more` the hub is told once half of the window was taken, else

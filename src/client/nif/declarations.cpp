@@ -85,8 +85,8 @@ void Declarations::finish_service(const std::string& service, GroupId group) {
   const MutexLock lock(mutex_);
   const auto found = services_.find(service);
   if (found == services_.end() || !found->second.ended) return;
-  // Where it moved meanwhile, on_advertised() saw to it; what is still asked for will be seen to
-  // there.
+  // If it moved meanwhile, on_advertised() saw to it, and will see to anything that is still asked
+  // for.
   if (found->second.group == group && !found->second.asked) services_.erase(found);
 }
 
@@ -271,7 +271,7 @@ void Declarations::on_unsubscribed(const std::string& full_name, const proto::Pa
   answered();
 }
 
-/// Where the own services are now that have or had a group, and those of others.
+/// The present groups of the own services that have or had one, and of those of others.
 SendQueue::GroupMap Declarations::moves() {
   SendQueue::GroupMap moves;
   const MutexLock lock(mutex_);
@@ -331,7 +331,7 @@ void Declarations::on_advertised(const std::string& service, const proto::Payloa
     if (!answer) add_refusal(*record, answer.error());
     events_.push_back(item_of(record, service.size()));
   }
-  // Who came or went while this node was away, nobody told it.
+  // Nobody told this node of those that came or went while it was away.
   if (answer && provides) {
     Record* record = make_event(NIF_SUBSCRIBERS, "");
     record->incoming.group = group.value();
@@ -361,7 +361,7 @@ void Declarations::on_subscribed(const std::string& full_name, const proto::Payl
       // Also that the hub takes it again while nobody provides it: a program that was told of the
       // refusal has to know.
       changed = (former != group || was_refused == answer.has_value()) && !ended;
-      // What the program asked for in between may never have left.
+      // Requests of the program in between may never have left.
       if (ended) subscriptions_due_.push_back(full_name);
       // Its SERVICE_MOVED was lost with the connection. A hub that began anew may have given it to
       // another one.

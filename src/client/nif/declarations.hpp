@@ -39,7 +39,7 @@ class Declarations {
   void finish_service(const std::string& service, GroupId group) GIMNET_EXCLUDES(mutex_);
   void add_subscription(const proto::ns::Subscribe& subscription, GroupId group)
       GIMNET_EXCLUDES(mutex_);
-  /// What there was of a subscription that the program begins or changes.
+  /// The former state of a subscription that the program begins or changes.
   struct Former {
     proto::ns::Subscribe request;
     bool ended = false;
@@ -74,7 +74,7 @@ class Declarations {
   void go_on() GIMNET_EXCLUDES(mutex_);
   /// False: nothing that the program waits for.
   [[nodiscard]] bool on_service_moved(const proto::ns::ServiceMoved& event) GIMNET_EXCLUDES(mutex_);
-  /// What the last answer brought that the program should know. Takes the references along.
+  /// The events of the last answer for the program. Takes the references along.
   [[nodiscard]] std::vector<Item> take_events();
   ~Declarations();
 

@@ -8,7 +8,7 @@
 #include "proto/control/ns.hpp"
 #include "proto/frame/report.hpp"
 
-// What the receive queue holds beside messages. Thread safety: pure functions.
+// The events that the receive queue holds beside messages. Thread safety: pure functions.
 
 namespace gimnet::nif {
 
@@ -19,7 +19,7 @@ namespace gimnet::nif {
 /// Its place in the receive queue; the reference goes with it.
 [[nodiscard]] Item item_of(Record* record, std::size_t bytes);
 
-/// What an event says of a service.
+/// Writes the state of a service into an event.
 void put_service(nif_incoming& incoming, const proto::ns::ServiceState& state);
 
 }  // namespace gimnet::nif

@@ -22,7 +22,7 @@
 
 namespace gimnet::nif {
 
-/// What the receiving half asks of the rest of the node. Called on the library's thread, with no
+/// The rest of the node, as the receiving half needs it. Called on the library's thread, with no
 /// lock held.
 class InboundHost {
  public:
@@ -41,16 +41,16 @@ class InboundHost {
   virtual void on_taken(std::uint32_t from, const proto::Taken& taken) = 0;
   /// True: the program did not ask for this report.
   virtual bool on_report(const proto::Report& report) = 0;
-  /// How the message with a fragment header began that the report is about, if that is known.
+  /// The beginning of the message with a fragment header that the report is about, if it is known.
   [[nodiscard]] virtual std::optional<ReportedMessages::Start> message_of(
       const proto::Report& report) = 0;
   /// It may not go now; tell_taken_again() brings it.
   virtual void send_taken(std::uint32_t to, const proto::Taken& taken) = 0;
-  /// What a message of that group is tagged with; 0: it does not count in a window.
+  /// The tag of a message of that group; 0: it does not count in a window.
   [[nodiscard]] virtual std::uint32_t epoch_for(std::uint32_t group) = 0;
   /// A message of that group ended of which the program gets nothing.
   virtual void on_message_lost(std::uint32_t group) = 0;
-  /// What was received, in order; takes over the references.
+  /// Takes what was received, in order, and the references.
   virtual void deliver(std::span<const Item> items) = 0;
 
  protected:
@@ -79,7 +79,7 @@ class Inbound {
   /// A new connection; what its handshake left over is to be given to take() next.
   void begin(const Session& session);
 
-  /// Where the next bytes go, at least one frame's worth. Empty: no memory. Valid until: take().
+  /// Room for the next bytes, at least one frame's worth. Empty: no memory. Valid until: take().
   [[nodiscard]] std::span<std::byte> space();
   /// When bytes were read from the socket.
   struct Arrival {

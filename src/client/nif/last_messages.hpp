@@ -25,8 +25,8 @@ struct LastMessage {
   [[nodiscard]] proto::FrameParts parts() const;
 };
 
-/// What hubs keep of the own retained services, kept here too: a hub that was started again has it
-/// no more. Thread safety: guarded by its owner. Limits: below; what is beyond is not kept but
+/// Last messages of the own retained services, which hubs keep too until they are started again.
+/// Thread safety: guarded by its owner. Limits: below; a message beyond them is not kept but
 /// counted, nor is an older message in its place, which would not be the last.
 class LastMessages {
  public:

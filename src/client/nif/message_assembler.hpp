@@ -22,7 +22,7 @@ class MessageAssembler {
   explicit MessageAssembler(const proto::ReassemblyLimits& limits)
       : limits_(limits), reassembler_(limits) {}
 
-  /// What the sender of a message is to be told.
+  /// The news for the sender of a message.
   struct Notice {
     std::uint32_t to = 0;
     proto::Taken taken;

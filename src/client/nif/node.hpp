@@ -56,7 +56,7 @@ class Node final : private InboundHost {
     return id_.load(std::memory_order_relaxed);  // a number by itself
   }
   [[nodiscard]] nif_info info() GIMNET_EXCLUDES(mutex_);
-  /// How often it has connected anew. Grows before anything is declared on the new connection.
+  /// Connections after the first. Grows before anything is declared on the new connection.
   [[nodiscard]] std::uint32_t reconnects() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] nif_counters counters() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::string last_error() GIMNET_EXCLUDES(mutex_);

@@ -13,9 +13,9 @@
 namespace gimnet::nif {
 namespace {
 
-/// How long nif_close() goes on writing what waits.
+/// nif_close() goes on this long to write what waits.
 constexpr std::int64_t kLeaveNs = 1'000'000'000;
-/// How long one try of a reconnect may take.
+/// The longest try of a reconnect.
 constexpr std::int64_t kRedialNs = 5'000'000'000;
 /// Keep-alive intervals after which the hub's clock is measured again, however busy the node is.
 constexpr std::int64_t kMeasureIntervals = 5;
@@ -287,7 +287,7 @@ void Node::on_goodbye(const proto::Goodbye& goodbye) {
   disconnect(std::move(why), goodbye.code);
 }
 
-/// What calls answer where no connection follows one that ended so; nothing: the library dials
+/// The answer of calls if no connection follows one that ended so; nothing: the library dials
 /// again.
 std::optional<Failure> Node::ending_of(const std::string& why, proto::GoodbyeCode code) const {
   switch (code) {

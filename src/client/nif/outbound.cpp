@@ -82,7 +82,7 @@ void Outbound::end_writing() {
 
 void Outbound::write_rounds(bool by_library) {
   writing_ = true;
-  // What came during the write of a burst is gathered again, after a look at what can be read.
+  // Messages that came during the write of a burst are gathered again, after a look at the socket.
   const int rounds_max = by_library && gather_burst() ? 1 : kWriteRoundsMax;
   int rounds = 0;
   // While the library's thread is in a callback nobody else would write the rest.

@@ -128,7 +128,7 @@ class Outbound {
   /// The library asks for reports of every message of more than a window, and some come when it is
   /// sent. Once the program does, it gets all: a hub merges them, whatever they are about.
   bool on_report(const proto::Report& report) GIMNET_EXCLUDES(mutex_);
-  /// How the message with a fragment header began that the report is about, if that is known.
+  /// The beginning of the message with a fragment header that the report is about, if it is known.
   [[nodiscard]] std::optional<ReportedMessages::Start> message_of(const proto::Report& report)
       GIMNET_EXCLUDES(mutex_);
 

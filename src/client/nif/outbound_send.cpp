@@ -24,8 +24,8 @@ constexpr std::uint32_t kQuickSends = 4;
 /// Of a PING that asks for a CONFIRM; HubClock, which counts from 1, takes its PONG for nothing
 /// that it asked.
 constexpr std::uint32_t kAskSequence = 0;
-/// How long the receiver of a message may leave its window closed before it is asked whether it is
-/// still there.
+/// The receiver of a message may leave its window closed this long before it is asked whether it
+/// is still there.
 constexpr std::int64_t kProbeNs = 1'000'000'000;
 
 /// Room for a frame with this payload before its prefix is written.
@@ -198,8 +198,8 @@ nif_status Outbound::wait_until_it_may_go(const Outgoing& message, std::size_t f
                   "the hub did not take the service again, after a break or another name");
     }
     if (may_go(message, frame_size, own)) return NIF_OK;
-    // What NIF_FLAG_MORE held back, or was left to the library's thread, goes before anybody waits
-    // for room.
+    // Messages that NIF_FLAG_MORE held back, or that were left to the library's thread, go before
+    // anybody waits for room.
     if (write_here()) continue;
     const std::int64_t now = steady_now_ns();
     if (now >= deadline) return no_turn();
@@ -223,7 +223,7 @@ void Outbound::put(Outgoing& message, std::optional<proto::FragmentHeader> fragm
           ? queue_.append_latest(header.lane, bytes, latest_stream_of(header, message.parts().key))
           : queue_.append(header.lane, bytes);
   message.write_frame(memory, id_, fragment, offset, size, report);
-  // What is urgent ends the gathering.
+  // An urgent message ends the gathering.
   count_appended(header.lane == static_cast<std::uint8_t>(proto::Lane::real_time) ? kBurstBytes
                                                                                   : bytes);
 }

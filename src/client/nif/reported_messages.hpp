@@ -11,7 +11,7 @@
 
 namespace gimnet::nif {
 
-/// How the last messages with a fragment header began whose frames ask for reports. A REPORT
+/// The beginnings of the last messages with a fragment header that ask for reports. A REPORT
 /// repeats 16 bytes of a frame, and of a fragment those are hardly more than its header: they tell
 /// the number of the message, and nothing of what it is. Thread safety: one thread at a time.
 /// Memory: 48 KiB, from the first message on.
@@ -25,7 +25,7 @@ class ReportedMessages {
   /// REQUIRES: the message has over 4 KiB.
   void remember(std::uint32_t number, Outgoing& message);
 
-  /// What stood behind the header of the message that the report is about. Nothing: it has no
+  /// The bytes behind the header of the message that the report is about. Nothing: it has no
   /// fragment header, that is behind other bytes (EXT, LIST ids), or the message is too old.
   [[nodiscard]] std::optional<Start> find(const proto::Report& report) const;
 

@@ -9,7 +9,7 @@
 namespace gimnet::nif {
 namespace {
 
-/// What one lane gets before the others are looked at again.
+/// The bytes of one lane before the others are looked at again.
 constexpr std::size_t kTurnBytes = 16 * 1024;
 /// A lane that waited while this much went is next: 1/16 of the bytes.
 constexpr std::size_t kPassedOverMax = 15 * kTurnBytes;
@@ -28,7 +28,7 @@ bool SendQueue::has_room(std::size_t frame_size) {
   const bool queue_has_room =
       unsent_bytes_ == 0 || unsent_bytes_ + frame_size <= limits_.queue_bytes;
   if (!queue_has_room || !resume_) return queue_has_room;
-  // What waits will be kept, too, once it is written.
+  // Frames that wait will be kept, too, once they are written.
   return retained_.make_room(unsent_bytes_ + frame_size) ||
          (retained_.bytes() == 0 && unsent_bytes_ == 0);
 }
@@ -179,8 +179,8 @@ void SendQueue::commit(std::size_t bytes) {
   return_staged();
 }
 
-/// What was not begun goes back where it came from, so that more urgent frames can still overtake
-/// it.
+/// Frames that were not begun go back where they came from, so that more urgent ones can still
+/// overtake them.
 void SendQueue::return_staged() {
   std::optional<FrameRun> begun;
   if (first_written_ > 0) {
@@ -240,7 +240,7 @@ std::optional<std::uint64_t> SendQueue::resume_from(std::uint64_t peer_taken) {
 void SendQueue::restart(std::uint32_t src) {
   retained_.restart();
   for (FrameRun& run : resend_) run.sort = FrameRun::Sort::data;
-  // What was begun on the old connection leads its lane again.
+  // A message that was begun on the old connection leads its lane again.
   while (!resend_.empty()) {
     FrameRun run = std::move(resend_.back());
     resend_.pop_back();

@@ -17,7 +17,7 @@
 
 namespace gimnet::nif {
 
-/// What a LATEST message replaces: an older one of the same stream.
+/// The stream of a LATEST message, which replaces an older one of it.
 struct LatestStream {
   std::uint64_t address = 0;  ///< dst, kind, lane, and whether there is a key
   std::uint64_t key = 0;

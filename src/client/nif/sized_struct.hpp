@@ -15,8 +15,8 @@ namespace gimnet::nif {
 /// No structure of any version is larger.
 inline constexpr std::size_t kStructSizeMax = 4096;
 
-/// What a program gave, as this version of the library has it. One compiled with an older header
-/// gives a shorter structure: what that does not have is zero, the default. One of a newer header
+/// A structure of the program, as this version of the library has it. A program with an older
+/// header gives a shorter one: the members that it lacks are zero, the default. A newer header
 /// may give a longer one, as long as it asks for nothing there. `given` leads to `whole` then.
 /// `doing` and `name` are for the sentence.
 template <class Struct>

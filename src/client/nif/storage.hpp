@@ -43,7 +43,7 @@ class Storage {
   std::atomic<std::uint32_t> references_{1};
 };
 
-/// What the socket is read into: many frames behind each other.
+/// The memory that the socket is read into: many frames behind each other.
 class Slab final : public Storage {
  public:
   static constexpr std::size_t kBytes = 256 * 1024;
@@ -63,7 +63,7 @@ class Slab final : public Storage {
   std::byte* const bytes_;
 };
 
-/// What a NIF_WATCHED tells, and what it points to.
+/// The content of a NIF_WATCHED, with all that it points to.
 struct WatchedChange {
   WatchedChange() = default;
   WatchedChange(const WatchedChange&) = delete;
@@ -107,7 +107,7 @@ struct Item {
   std::uint32_t epoch = 0;  ///< of a message that counts in a window (CreditBook)
 };
 
-/// What nif_receive() gives out for it; the reference goes with it.
+/// The item as nif_receive() gives it out; the reference goes with it.
 [[nodiscard]] nif_incoming incoming_of(const Item& item);
 
 }  // namespace gimnet::nif

@@ -15,7 +15,7 @@ constexpr std::string_view kMagic = "GIMtoken";
 constexpr std::uint16_t kVersion = 1;
 constexpr std::size_t kSizesAt = 10;
 constexpr std::size_t kHeadSize = 16;
-/// How much of a name is in its file's: the whole has to stay below 255 bytes.
+/// Bytes of a name in the name of its file, which has to stay below 255 bytes.
 constexpr std::size_t kReadableMax = 60;
 
 std::span<const std::byte> bytes_of(std::string_view text) {

@@ -14,7 +14,7 @@ namespace ns = proto::ns;
 
 namespace {
 
-/// What nif_incoming.watched points to.
+/// The memory that nif_incoming.watched points to.
 struct OwnedChange final : WatchedChange {
   explicit OwnedChange(const ns::WatchEvents& events, const ns::Change& told) : change(told) {
     view.watch = events.watch;

@@ -33,14 +33,14 @@ class WatchTable {
   /// numbers for requests are short. Any thread.
   void taken(std::uint32_t number) GIMNET_EXCLUDES(mutex_);
 
-  /// What the hub told. True: the program is to have it; false: it is of no watch, or behind a gap,
+  /// The hub's news. True: the program is to have it; false: it is of no watch, or behind a gap,
   /// after which the watch begins anew.
   [[nodiscard]] bool on_events(const proto::ns::WatchEvents& events) GIMNET_EXCLUDES(mutex_);
   /// A new connection.
   void declare_again() GIMNET_EXCLUDES(mutex_);
   /// Goes on where numbers for requests were short.
   void go_on() GIMNET_EXCLUDES(mutex_);
-  /// What the program should know of a watch that the hub did not take again, after its answer.
+  /// News for the program of a watch that the hub did not take again, after its answer.
   /// Takes the references along.
   [[nodiscard]] std::vector<Item> take_events();
 
@@ -68,7 +68,7 @@ class WatchTable {
   std::vector<Item> events_;
 };
 
-/// What the program is given for one change: a record with all that it points to. REQUIRES:
+/// The program's view of one change: a record with all that it points to. REQUIRES:
 /// `change` is one of `events`.
 [[nodiscard]] Record* make_watched(const proto::ns::WatchEvents& events,
                                    const proto::ns::Change& change);

@@ -6,7 +6,7 @@
 
 namespace gimnet::nif {
 
-/// How far ahead of what came the sender of one large message may be: what its path carries in
+/// The lead of a large message's sender over the bytes that came: as much as its path carries in
 /// kLoopNs, so that a slow path is kept busy and nothing piles up in the queues on it.
 ///
 /// A path whose round trip alone is longer than kLoopNs needs more, and looks the same from here as

@@ -14,10 +14,10 @@
 namespace gimnet::tool {
 namespace {
 
-/// What follows is no option, whatever it begins with: the names of nodes may begin so.
+/// Words behind it are no options, whatever they begin with: the names of nodes may begin so.
 constexpr std::string_view kEndOfOptions = "--";
 
-/// What the words call: a command and, of `ctl`, an action. "" where it is missing.
+/// The command that the words call and, of `ctl`, the action. "": it is missing.
 struct Called {
   std::string_view command;
   std::string_view action;
@@ -54,7 +54,7 @@ CommandEnding wrong(const std::string& sentence, const Called& called) {
           "gimnet: " + sentence + "\n`" + called.text() + " --help` shows how it is called.\n"};
 }
 
-/// What the tools of other networks call their commands, and ours that does it; "" if none is
+/// Commands of the tools of other networks, and ours that does the same; "" if none is
 /// known.
 std::string_view command_meant(std::string_view word) {
   static constexpr std::array<std::pair<std::string_view, std::string_view>, 9> kWords{{
@@ -82,7 +82,7 @@ CommandEnding unknown_command(std::string_view word) {
   }
   std::array<std::string_view, kCommands.size()> names;
   for (std::size_t i = 0; i < names.size(); ++i) names[i] = kCommands[i].first;
-  // What other tools have as commands.
+  // Other tools have these as commands.
   const bool is_option = word == "help" || word == "version";
   const std::string nearest =
       is_option ? "; did you mean --" + std::string(word) + "?" : did_you_mean(word, names);
@@ -147,7 +147,7 @@ std::string too_many(const ToolOptions& options, const Called& called) {
          word + "'` lists those that match";
 }
 
-/// What CLI11 cannot know.
+/// A contradiction that CLI11 cannot know.
 std::string contradiction(const ToolOptions& options) {
   if (options.json && options.raw)
     return "--json and --raw contradict each other: give one of them";
@@ -234,7 +234,7 @@ std::string unexpected(const LeftOver& left, const std::vector<const CLI::Option
   return "there is no option " + given + " for " + called.text() + did_you_mean(given, views);
 }
 
-/// What CLI11 would take for something else; "": nothing.
+/// A word that CLI11 would take for something else; "": none.
 std::string wrong_word(std::span<const char* const> words,
                        const std::vector<const CLI::Option*>& options) {
   return wrong_option_word(words, [&options](std::string_view name) {
@@ -246,7 +246,7 @@ std::string wrong_word(std::span<const char* const> words,
   });
 }
 
-/// What CLI11 says, in words that name the option, what was given and what it takes.
+/// The error of CLI11, in words that name the option, what was given and what it takes.
 std::string explained(const CLI::ParseError& error,
                       const std::vector<const CLI::Option*>& options) {
   std::string said = error.what();

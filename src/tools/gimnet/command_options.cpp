@@ -25,7 +25,7 @@ class HelpFormat final : public CLI::Formatter {
 
   std::string make_option_opts(const CLI::Option* option) const override {
     const std::string type = option->get_type_name();  // "UINT:UINT in [1 - 64]"; "" of a flag
-    // What the command line takes in a certain place says its own name.
+    // An argument that the command line takes in a certain place says its own name.
     if (type.empty() || option->get_positional()) return "";
     const bool whole = type.starts_with("UINT") || type.starts_with("INT");
     const char* what = whole ? " N" : type.starts_with("FLOAT") ? " X" : " WORD";

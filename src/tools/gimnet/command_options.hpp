@@ -13,7 +13,7 @@ class FormatterBase;
 
 namespace gimnet::tool {
 
-/// How help is laid out: commands in a line each, and options without the types and ranges that
+/// The layout of help: commands in a line each, and options without the types and ranges that
 /// their descriptions say in words. Thread safety: immutable.
 [[nodiscard]] std::shared_ptr<CLI::FormatterBase> help_format();
 
@@ -26,7 +26,7 @@ class Validator;
 
 }  // namespace CLI
 
-// What `gimnet --help` and `gimnet COMMAND --help` begin with: what it does, and examples.
+// The beginnings of `gimnet --help` and `gimnet COMMAND --help`: the purpose, and examples.
 
 namespace gimnet::tool::help {
 
@@ -48,7 +48,7 @@ Data goes to standard output, words to standard error. Ends with 0 done, 1 faile
 4 not found, 5 no answer or no data in time, 6 denied, 7 the hub has another version, 129, 130 and 143 by signal.
 )";
 
-/// What each command's help ends with.
+/// The end of each command's help.
 inline constexpr const char* kEverywhere =
     "With every command: --hub URL, --json, --color WORD; `gimnet --help` explains them.";
 

@@ -164,7 +164,7 @@ std::optional<Peer> parse_new_id(const std::string& text, Peer node) {
   return Peer{make_id<NodeId>(hub_of(NodeId{node.id}), index).value()};
 }
 
-/// What a command that only changes something says when it is done.
+/// The end of a command that only changes something.
 ExitCode done(ToolSession& session, const Outcome<void>& outcome, const std::string& text) {
   if (!outcome) return session.fail(outcome.failure());
   if (session.options().json) {

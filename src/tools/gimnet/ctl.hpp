@@ -17,7 +17,7 @@ enum class CtlAction : std::uint8_t { connections, routes, kick, reassign, drain
 inline constexpr std::array<std::string_view, 7> kCtlActions{
     "connections", "routes", "kick", "reassign", "drain", "reload", "log"};
 
-/// What `gimnet ctl` is to do. Thread safety: immutable once read.
+/// The task of `gimnet ctl`. Thread safety: immutable once read.
 struct CtlOptions {
   CtlAction action = CtlAction::connections;
   std::string node;    ///< kick, reassign: name or id

@@ -7,7 +7,7 @@
 
 namespace gimnet::tool {
 
-/// How the program ends; scripts rely on the numbers. A signal gives 128 and its number.
+/// The end of the program; scripts rely on the numbers. A signal gives 128 and its number.
 enum class ExitCode : std::uint8_t {
   done = 0,
   failed = 1,

@@ -11,7 +11,7 @@
 
 namespace gimnet::tool {
 
-/// What a hub says of itself at one moment. Thread safety: a value type.
+/// A hub's account of itself at one moment. Thread safety: a value type.
 struct HubStatus {
   HubRecord hub;
   std::vector<ShardCounts> shards;

@@ -14,7 +14,7 @@
 namespace gimnet::tool {
 namespace {
 
-/// Where the size is not known before.
+/// Room for a start if the size is not known before.
 constexpr std::size_t kFirstBytes = std::size_t{1} << 20;
 
 Failure too_large(const std::string& path, std::size_t bytes_max) {

@@ -16,7 +16,7 @@ namespace gimnet::tool {
 /// safety: one thread.
 class NewsPace {
  public:
-  /// How often it is said at most.
+  /// The shortest time between two words about it.
   static constexpr std::int64_t kPeriodNs = 1'000'000'000;
 
   /// There is something to say: now? If so, not again for kPeriodNs.
@@ -38,7 +38,7 @@ class NewsPace {
 /// Why messages did not come: a full queue, and who filled it, if that is known.
 [[nodiscard]] std::string queue_full_words(std::string_view whose, const Peer& filled_by);
 
-/// What was lost on its way to this node, and when to say so. Thread safety: one thread.
+/// Messages lost on their way to this node, and when to say so. Thread safety: one thread.
 class LostMessages {
  public:
   /// As the node counts them now.
@@ -57,8 +57,8 @@ class LostMessages {
   NewsPace pace_;
 };
 
-/// What did not come of services, by the gaps between the numbers of what came, why, and when to
-/// say so. Times are those of steady_now_ns(). Thread safety: one thread.
+/// Messages of services that did not come, by the gaps between numbers, why, and when to say
+/// so. Times are those of steady_now_ns(). Thread safety: one thread.
 class MissedMessages {
  public:
   /// Was the service subscribed to later than it began? As MatchingServices::take_lateness().

@@ -165,7 +165,7 @@ std::string text_of(const std::vector<ServiceReading>& readings, Measure measure
 
 namespace {
 
-/// How often a line is printed.
+/// The time between two lines.
 constexpr std::int64_t kReportNs = 1'000'000'000;
 constexpr Timeout kReport{1'000};
 

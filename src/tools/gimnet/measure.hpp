@@ -31,7 +31,7 @@ class MeterStatistics {
   double squares_ = 0.0;  ///< sum of squared distances from the mean (Welford's method)
 };
 
-/// What came of one service in some time.
+/// The messages of one service in some time.
 struct MeterReading {
   MeterStatistics gaps_ms;      ///< between a message and the one before it, ended in that time
   MeterStatistics sizes_bytes;  ///< payloads; its count is the number of messages
@@ -76,7 +76,7 @@ class Meter {
   MeterReading whole_;
 };
 
-/// What `gimnet hz` and `gimnet bw` are asked for.
+/// The figures of `gimnet hz` and `gimnet bw`.
 enum class Measure : std::uint8_t { rate, bytes };
 /// Of what time: the last window, or all of it.
 enum class Span : std::uint8_t { recent, whole };

@@ -36,7 +36,7 @@ enum class Command : std::uint8_t {
 /// When to print colours: on a terminal, unless NO_COLOR says no.
 enum class Colour : std::uint8_t { automatic, always, never };
 
-/// What the command line asks for. Thread safety: immutable once read.
+/// The command line. Thread safety: immutable once read.
 struct ToolOptions {
   Command command = Command::status;
   std::string hub;  ///< "": the environment's GIMNET_HUB, else the hub of this machine

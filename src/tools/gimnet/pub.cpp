@@ -27,15 +27,15 @@ std::string UnheardLines::sentence(const std::string& service, bool waited) cons
 
 namespace {
 
-/// How long the last lines may take to leave.
+/// The last lines may take this long to leave.
 constexpr Timeout kDrain{10'000};
-/// How long it may take the library to say why, at the longest.
+/// The library may take this long to say why.
 constexpr std::int64_t kWhyNs = 1'000'000'000;
-/// How often the connection is looked at.
+/// The time between two looks at the connection.
 constexpr std::int64_t kLookNs = 200'000'000;
 
-/// What goes on only while a hub is there: looks now and then, says what it sees, and waits where
-/// nothing stands, since publishing would wait without a word.
+/// A connection without which nothing goes on: looks now and then, says what it sees, and waits if
+/// there is none, since publishing would wait without a word.
 class Standing {
  public:
   Standing(ToolSession& session, const Publisher& publisher)
@@ -90,7 +90,7 @@ class Retaining {
   bool told_ = false;
 };
 
-/// Whoever publishes may hear that the service was refused a moment before the library says why.
+/// A publisher may hear that the service was refused a moment before the library says why.
 Outcome<void> why_refused(ToolSession& session, const Publisher& publisher,
                           const Outcome<void>& sent) {
   const std::int64_t end_ns = steady_now_ns() + kWhyNs;
@@ -199,7 +199,7 @@ ExitCode run_pub(ToolSession& session) {
     sent = publish_lines(session, *publisher, standing, unheard, retaining);
   if (sent && !session.stopped()) sent = session.node().drain(kDrain);
   retaining.look_at(publisher->retained());
-  // What is retained is for those who come later.
+  // A retained line is for those that come later.
   const std::string unheard_words = unheard.sentence(options.target, options.subscribers > 0);
   if (sent && !session.stopped() && !options.retain && !unheard_words.empty()) say(unheard_words);
   write_counts(session, *publisher);

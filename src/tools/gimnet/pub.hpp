@@ -10,8 +10,8 @@ namespace gimnet::tool {
 /// only the publisher can say so. Thread safety: one thread.
 class UnheardLines {
  public:
-  /// How many have subscribed right before a line is published, and right behind. Of whom comes in
-  /// between nobody knows whether the line reaches it: that counts as heard.
+  /// The subscribers right before a line is published, and right behind. A line may or may not
+  /// reach one that comes in between: that counts as heard.
   void before_line(std::size_t subscribers) { alone_ = subscribers == 0; }
   void after_line(std::size_t subscribers) {
     ++lines_;

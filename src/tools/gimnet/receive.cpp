@@ -126,7 +126,7 @@ ExitCode run_echo(ToolSession& session) {
   if (const auto ending = session.join({})) return *ending;
   Subscriptions subscriptions(session.node(), session.options().target, kFreshMessages,
                               session.options().pace);
-  // Whoever asks for less than all has gaps on purpose.
+  // A user that asks for less than all has gaps on purpose.
   const bool all = !wants_less(session.options().pace);
   if (const auto opened = subscriptions.open(); !opened) return session.fail(opened.failure());
   if (const std::string words = subscriptions.waits_for(); !words.empty()) say(words);

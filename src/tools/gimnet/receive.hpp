@@ -12,7 +12,7 @@
 
 namespace gimnet::tool {
 
-/// What did not come until a message did.
+/// The messages that did not come until one did.
 struct Absent {
   std::uint64_t lost = 0;               ///< to this node, on the way
   std::optional<std::uint64_t> missed;  ///< of the message's service, where somebody counted

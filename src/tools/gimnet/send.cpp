@@ -49,7 +49,7 @@ Outcome<void> send_file(const Sender& sender, const std::string& path) {
   return sender.settle();
 }
 
-/// What of the input was not sent.
+/// The part of the input that was not sent.
 enum class Unsent : std::uint8_t { nothing, rest, line_and_rest };
 
 /// Waits for the fate of what was sent before a loss, or before a message that could not be sent,

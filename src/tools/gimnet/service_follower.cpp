@@ -111,9 +111,9 @@ std::vector<std::string> VanishedServices::rest() {
 
 namespace {
 
-/// How long it waits before it asks again for what the hub has refused.
+/// The wait before it asks again for what the hub has refused.
 constexpr std::int64_t kRetryNs = 1'000'000'000;
-/// How often it looks whether the hub has its subscriptions still.
+/// The time between two looks whether the hub has its subscriptions still.
 constexpr std::int64_t kLookNs = 500'000'000;
 
 }  // namespace

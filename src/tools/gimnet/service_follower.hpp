@@ -23,7 +23,7 @@ namespace gimnet::tool {
 /// Thread safety: one thread.
 class MatchingServices {
  public:
-  /// How many services that are gone are remembered. Their subscriptions stay, so that a service
+  /// Services that are gone and remembered. Their subscriptions stay, so that a service
   /// that is back loses nothing: more than programs that are started again, fewer than would fill
   /// the hub's subscriptions_per_node.
   static constexpr std::size_t kGoneMax = 256;
@@ -79,7 +79,7 @@ class MatchingServices {
 /// steady_now_ns(). Thread safety: one thread.
 class VanishedServices {
  public:
-  /// How long a message may still come behind the news that its service is gone.
+  /// A message may still come this long behind the news that its service is gone.
   static constexpr std::int64_t kLateNs = 1'000'000'000;
   /// Has no message of the service ever come?
   using IsSilent = std::function<bool()>;
@@ -114,7 +114,7 @@ class VanishedServices {
 inline constexpr QueueOptions kAllMessages{4096, AtFullQueue::stop_reading};
 /// As the library chooses: of a service with delivery `latest` only the newest message waits.
 inline constexpr QueueOptions kFreshMessages{0, AtFullQueue::stop_reading};
-/// How long subscribing may take.
+/// The longest time of subscribing.
 inline constexpr Timeout kSubscribe{5'000};
 
 /// Subscribes to all services that match a pattern, to those that come later as soon as the hub
@@ -154,7 +154,7 @@ class ServiceFollower {
   void run() GIMNET_EXCLUDES(mutex_);
   void take(const WatchEvent& event) GIMNET_EXCLUDES(mutex_);
   void fail(Failure failure) GIMNET_EXCLUDES(mutex_);
-  /// How long there is nothing to do but to wait for news.
+  /// The time for which there is nothing to do but to wait for news.
   [[nodiscard]] Timeout patience() const GIMNET_EXCLUDES(mutex_);
   /// One that is wanted, if any. Errors: as Node::subscribe(); it is wanted still.
   [[nodiscard]] Outcome<void> subscribe_next(Timeout timeout) GIMNET_EXCLUDES(mutex_);

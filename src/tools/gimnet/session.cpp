@@ -46,7 +46,7 @@ bool ConnectionWatch::goes_on() {
 }
 
 void say(const std::string& sentence) {
-  // What a hub or another node says may have anything in it; of that, only ends of lines are for
+  // Words of a hub or another node may have anything in them; of that, only ends of lines are for
   // the terminal.
   std::string shown;
   for (std::size_t begin = 0; begin <= sentence.size();) {
@@ -88,7 +88,7 @@ std::optional<ExitCode> ToolSession::settle(Outcome<Node> joined) {
           failure.status == Status::no_host ? "look at its name" : "start one there with `tcphub`");
     }
     const ExitCode code = fail(failure);
-    // Whoever answers there lets nobody in, or is no hub.
+    // The peer there lets nobody in, or is no hub.
     const bool no_hub = failure.status == Status::timeout || failure.status == Status::protocol;
     return no_hub && code == exit_code_of(failure.status) ? ExitCode::no_connection : code;
   }
@@ -163,7 +163,7 @@ std::string ToolSession::wider_pattern(const std::string& kind, const std::strin
   return any ? "; did you mean '" + wider + "'?" : "";
 }
 
-/// What to do where no hub answers: `remedy`, or name another.
+/// --hub, or GIMNET_HUB; "": the hub of this machine.
 std::string ToolSession::hub() const {
   if (!options_.hub.empty()) return options_.hub;
   const char* named = std::getenv("GIMNET_HUB");

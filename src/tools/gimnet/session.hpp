@@ -21,7 +21,7 @@ namespace gimnet::tool {
 /// nothing to wait for. Thread safety: one thread.
 class ConnectionWatch {
  public:
-  /// How long a break goes unnoticed at most by whoever looks now and then.
+  /// A break goes unnoticed at most this long by one that looks now and then.
   static constexpr Timeout kPeriod{500};
 
   /// `node` must outlive it.
@@ -50,10 +50,10 @@ class ConnectionWatch {
   std::string told_;  ///< why it broke last
 };
 
-/// How nodes of this tool describe themselves.
+/// The description of this tool's nodes.
 inline constexpr const char* kToolDescription = "gimnet tool";
 
-/// What a command works with. Thread safety: one thread.
+/// The things that a command works with. Thread safety: one thread.
 class ToolSession {
  public:
   ToolSession(const ToolOptions& options, StopSignal& stop) : options_(options), stop_(stop) {}
@@ -100,7 +100,7 @@ class ToolSession {
   [[nodiscard]] bool stopped() { return stop_.signal() != 0; }
 
  private:
-  /// How to join; what the options say is filled in.
+  /// The options of joining, with those of the command line filled in.
   [[nodiscard]] NodeOptions options_for(NodeOptions how) const;
   [[nodiscard]] std::optional<ExitCode> settle(Outcome<Node> joined);
   [[nodiscard]] std::string advice(std::string remedy) const;

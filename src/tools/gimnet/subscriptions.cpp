@@ -48,7 +48,7 @@ Outcome<Message> Subscriptions::receive(Timeout timeout) {
     if (!follower_) return message;
     for (const std::string& sentence : follower_->news(now_ns)) say(sentence);
     if (message || !message.is(Status::timeout)) return message;
-    // What waited here came before.
+    // Messages that waited here came before.
     if (const auto failure = follower_->failure()) return *failure;
     return message;
   }

@@ -31,14 +31,14 @@ class Subscriptions {
   /// accepts data; limit and others: the hub did not take the subscription again after a break; for
   /// a pattern also refused: it takes in no more services.
   [[nodiscard]] Outcome<Message> receive(Timeout timeout);
-  /// What receive() would still have said.
+  /// Says what receive() would still have said.
   void say_rest();
 
   /// By full name: how many messages were missed.
   [[nodiscard]] std::map<std::string, std::uint64_t> missed() const;
   /// As MatchingServices::take_lateness(); never of one that was called by its full name.
   [[nodiscard]] bool take_lateness(std::string_view service);
-  /// What to tell the user while there is nothing to subscribe to; "" when there is.
+  /// The words for the user while there is nothing to subscribe to; "" when there is.
   [[nodiscard]] std::string waits_for() const;
 
  private:

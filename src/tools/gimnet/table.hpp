@@ -17,7 +17,7 @@ namespace gimnet::tool {
 /// Bytes with the unit that suits them, powers of 1,000: "999 B", "1.5 kB", "2.0 MB".
 [[nodiscard]] std::string byte_count(double bytes);
 
-/// What a text means, from which its colour follows.
+/// The meaning of a text, from which its colour follows.
 enum class Tone : std::uint8_t { plain, heading, warning, bad };
 
 /// Colours text, or leaves it as it is. Thread safety: immutable.
