@@ -322,12 +322,18 @@ class Node {
   /// Services whose full name matches, ascending group ids.
   Outcome<std::vector<ServiceRecord>> services(std::string_view pattern = {},
                                                Timeout timeout = Timeout{5000}) const;
-  /// The hub itself, the counters of its io threads, its connections (ascending ids), and the hubs
-  /// that it knows (docs/operations.md).
-  Outcome<HubRecord> hub(Timeout timeout = Timeout{5000}) const;
-  Outcome<std::vector<ShardCounts>> hub_counters(Timeout timeout = Timeout{5000}) const;
-  Outcome<std::vector<ConnectionRecord>> hub_connections(Timeout timeout = Timeout{5000}) const;
-  Outcome<std::vector<RouteRecord>> hub_routes(Timeout timeout = Timeout{5000}) const;
+  /// The hub itself, the counters of its io threads, its connections (ascending ids), the hubs that
+  /// it knows (ascending ids), and its links to others (docs/operations.md). `hub_id` names another
+  /// hub of the network; 0 is the own hub. Errors also: not_found (there is no way to that hub).
+  Outcome<HubRecord> hub(Timeout timeout = Timeout{5000}, std::uint32_t hub_id = 0) const;
+  Outcome<std::vector<ShardCounts>> hub_counters(Timeout timeout = Timeout{5000},
+                                                 std::uint32_t hub_id = 0) const;
+  Outcome<std::vector<ConnectionRecord>> hub_connections(Timeout timeout = Timeout{5000},
+                                                         std::uint32_t hub_id = 0) const;
+  Outcome<std::vector<NetworkHub>> hubs(Timeout timeout = Timeout{5000},
+                                        std::uint32_t hub_id = 0) const;
+  Outcome<std::vector<LinkRecord>> hub_links(Timeout timeout = Timeout{5000},
+                                             std::uint32_t hub_id = 0) const;
 
   // ---- changing the hub, for those who joined as administrators; everybody else is denied
 
@@ -345,6 +351,15 @@ class Node {
   /// The hub reads its configuration again. Errors: bad_argument (it is wrong, and nothing was
   /// changed), denied.
   Outcome<std::vector<HubChange>> reload_hub(Timeout timeout = Timeout{5000}) const;
+  /// The hub dials one link more, until it ends; an empty name is the URL, cost 0 is measured.
+  /// Errors: bad_argument (no URL, a name that is there, another machine without `insecure`).
+  Outcome<void> add_link(std::string_view url, std::string_view name = {}, std::uint16_t cost = 0,
+                         Timeout timeout = Timeout{5000}) const;
+  /// Ends a link that the hub dials. Errors: not_found.
+  Outcome<void> remove_link(std::string_view name, Timeout timeout = Timeout{5000}) const;
+  /// Fixes the cost of a link that the hub dials; 0: measured. Errors: not_found.
+  Outcome<void> set_link_cost(std::string_view name, std::uint16_t cost,
+                              Timeout timeout = Timeout{5000}) const;
   /// error, warning, info, debug or off. The level before. Errors: bad_argument, denied.
   Outcome<std::string> set_hub_log_level(std::string_view level,
                                          Timeout timeout = Timeout{5000}) const;

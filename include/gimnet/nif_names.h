@@ -188,7 +188,11 @@ enum {
   NIF_CTRL_DRAIN = 6,
   NIF_CTRL_RELOAD = 7,
   NIF_CTRL_LOG_LEVEL = 8,
-  NIF_CTRL_ROUTES = 9
+  NIF_CTRL_HUBS = 9,
+  NIF_CTRL_LINKS = 10,
+  NIF_CTRL_LINK_ADD = 11,
+  NIF_CTRL_LINK_REMOVE = 12,
+  NIF_CTRL_LINK_COST = 13
 };
 
 /** Most bytes of content of a nif_request(). */
@@ -207,6 +211,11 @@ typedef struct nif_reply {
  * also: another kind or operation, or more than NIF_REQUEST_BYTES_MAX bytes of content. */
 nif_status nif_request(nif_node* node, uint8_t kind, uint16_t operation, const void* content,
                        size_t size, nif_reply** reply, int32_t timeout_ms);
+/** The same of another hub of the network; hub_id 0 is the own hub. Requests that change a hub are
+ * answered `denied` there. */
+nif_status nif_request_of_hub(nif_node* node, uint32_t hub_id, uint8_t kind, uint16_t operation,
+                              const void* content, size_t size, nif_reply** reply,
+                              int32_t timeout_ms);
 void nif_free_reply(nif_reply* reply);
 
 /** Measures the way to the hub with one FLOW PING: round trip and hub's clock minus this one, in

@@ -152,6 +152,7 @@ HubFacts facts_of(const HubOptions& options, const StartState& from) {
   std::memcpy(facts.unique.bytes.data(), from.start.state.unique_id.data(),
               facts.unique.bytes.size());
   facts.instance = from.instance;
+  facts.insecure = options.insecure;
   facts.name = options.shown_name();
   facts.version = kVersion;
   facts.shards = options.shards;

@@ -211,10 +211,10 @@ class Administration(Tool):
     # Over TCP, that is as nobody in particular: exit code, words, arguments of ctl.
     DENIED_TO_OTHERS = [(DENIED, ["administrators connect over the hub's Unix socket", "--hub unix:/PATH"], words)
                         for words in (["kick", "robot"], ["reassign", "robot", "7.99"], ["drain"], ["reload"],
-                                      ["log", "debug"])]
+                                      ["log", "debug"], ["link", "add", "unix:/a"], ["link", "remove", "a"], ["link", "cost", "a", "5"])]
     # Over the Unix socket. B is {robot}, mute is {mute}.
     CANNOT_BE = [
-        (USAGE, ["action is missing: connections, routes, kick, reassign, drain, reload or log", "`gimnet ctl " + HOW], []),
+        (USAGE, ["action is missing: connections, kick, reassign, drain, reload, log or link", "`gimnet ctl " + HOW], []),
         (USAGE, ["there is no action 'kik' of gimnet ctl; did you mean kick?", "`gimnet ctl " + HOW], ["kik", "robot"]),
         (USAGE, ["node is missing: name or id", "`gimnet ctl kick " + HOW], ["kick"]),
         (USAGE, ["node needs a value: name or id"], ["kick", ""]),

@@ -6,7 +6,7 @@
 
 #include "fuzz/support/control_round_trip.hpp"
 #include "proto/bitestream/reader.hpp"
-#include "proto/control/ctrl.hpp"
+#include "proto/control/ctrl_network.hpp"
 #include "proto/control/ns_register.hpp"
 #include "proto/control/ns_watch.hpp"
 
@@ -42,6 +42,11 @@ void check_requests(Bytes payload) {
   fuzz::check_message<ctrl::Reassign>(payload);
   fuzz::check_message<ctrl::Reload>(payload);
   fuzz::check_message<ctrl::SetLogLevel>(payload);
+  fuzz::check_message<ctrl::Hubs>(payload);
+  fuzz::check_message<ctrl::Links>(payload);
+  fuzz::check_message<ctrl::LinkAdd>(payload);
+  fuzz::check_message<ctrl::LinkRemove>(payload);
+  fuzz::check_message<ctrl::LinkCost>(payload);
 }
 
 /// A list that was accepted has an id in each record.
@@ -73,7 +78,8 @@ void check_answers(Bytes payload) {
   if (fuzz::check_answer<ns::ServicesAnswer>(payload)) check_records(payload);
   if (fuzz::check_answer<ctrl::StatisticsAnswer>(payload)) check_records(payload);
   if (fuzz::check_answer<ctrl::ConnectionsAnswer>(payload)) check_records(payload);
-  if (fuzz::check_answer<ctrl::RoutesAnswer>(payload)) check_records(payload);
+  if (fuzz::check_answer<ctrl::HubsAnswer>(payload)) check_records(payload);
+  fuzz::check_answer<ctrl::LinksAnswer>(payload);
   if (fuzz::check_answer<ctrl::ReloadAnswer>(payload)) check_records(payload);
   fuzz::check_answer<ctrl::SetLogLevelAnswer>(payload);
 }

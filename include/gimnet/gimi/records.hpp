@@ -108,13 +108,45 @@ struct HubChange {
   bool needs_restart = false;  ///< `from` stays in force until then
 };
 
-/// A hub that this hub knows, itself among them.
-struct RouteRecord {
+/// A hub that this hub knows, itself among them, and the way to it.
+struct NetworkHub {
+  /// A link of that hub, as it tells.
+  struct Edge {
+    std::uint32_t hub_id = 0;
+    std::uint32_t cost = 0;
+  };
   std::uint32_t hub_id = 0;
   std::string name;
-  std::uint32_t next_hop = 0;
-  std::uint32_t cost = 0;
-  std::uint32_t nodes = 0;
+  std::string version;
+  std::uint32_t distance = 0;  ///< links on the way; 0: the hub that was asked
+  std::uint32_t cost = 0;      ///< of the way
+  std::uint32_t next_hop = 0;  ///< itself for the hub that was asked; 0: there is no way
+  std::uint32_t nodes = 0;     ///< 0 of another hub also where they are not known
+  std::uint32_t services = 0;  ///< the same
+  bool reachable = false;
+  bool too_far = false;  ///< reachable, but over more links than a message may cross
+  std::vector<Edge> edges;
+};
+
+/// A link of a hub to another one.
+struct LinkRecord {
+  std::string name;
+  std::uint32_t hub_id = 0;          ///< at the other end; 0: not known
+  std::string peer;                  ///< the URL that is dialled, or where the other side came from
+  std::string state;                 ///< dialling, away, learning, standby, damped or up
+  bool dialled = false;              ///< by this hub
+  std::uint32_t cost = 0;            ///< 0: not measured yet
+  std::uint32_t rtt_us = 0;          ///< 0: none yet
+  std::int64_t clock_offset_ns = 0;  ///< the other hub's clock minus this one's
+  std::uint64_t clock_error_ns = 0;  ///< of the offset; 0: it is not known
+  std::uint64_t queued_bytes = 0;
+  std::uint64_t sent_bytes = 0;
+  std::uint64_t received_bytes = 0;
+  std::uint64_t accepted = 0;   ///< messages' frames from it
+  std::uint64_t delivered = 0;  ///< frames that the other side confirmed
+  std::uint64_t dropped = 0;    ///< frames for it
+  std::uint64_t unsure = 0;     ///< of these, those that may have arrived
+  std::string last_error;       ///< "": none
 };
 
 struct ConnectionRecord {

@@ -7,7 +7,7 @@
 #include "client/gimi/ending.hpp"
 #include "client/gimi/uplink.hpp"
 #include "client/nif/answer_status.hpp"
-#include "proto/control/ctrl.hpp"
+#include "proto/control/ctrl_network.hpp"
 
 namespace gimnet::gimi {
 namespace {
@@ -21,12 +21,12 @@ proto::bitestream::Writer body_of(const Request& request) {
 
 /// Asks the hub and reads its answer.
 template <class Answer, class Request>
-Outcome<Answer> ask(nif_node* node, const Request& request, const std::string& doing,
-                    Timeout timeout) {
+Outcome<Answer> ask(Asking who, const Request& request, const std::string& doing, Timeout timeout) {
   const auto body = body_of(request);
   nif_reply* reply = nullptr;
-  const nif_status status = nif_request(node, NIF_CTRL, Request::kOperation, body.bytes().data(),
-                                        body.size(), &reply, nif_timeout(timeout));
+  const nif_status status =
+      nif_request_of_hub(who.node, who.hub_id, NIF_CTRL, Request::kOperation, body.bytes().data(),
+                         body.size(), &reply, nif_timeout(timeout));
   if (status != NIF_OK) return failure_of(status, doing);
   const std::unique_ptr<nif_reply, void (*)(nif_reply*)> owner(reply, &nif_free_reply);
   if (reply->status != 0) {
@@ -103,16 +103,16 @@ Outcome<std::vector<ServiceRecord>> list_services(nif_node* node, const std::str
   return records;
 }
 
-Outcome<HubRecord> ask_hub(nif_node* node, Timeout timeout) {
-  const auto answer = ask<proto::ctrl::HubInfoAnswer>(node, proto::ctrl::HubInfo{},
+Outcome<HubRecord> ask_hub(Asking who, Timeout timeout) {
+  const auto answer = ask<proto::ctrl::HubInfoAnswer>(who, proto::ctrl::HubInfo{},
                                                       "ask the hub who it is", timeout);
   if (!answer) return answer.failure();
   return HubRecord{answer->hub.value(), answer->hub_name, answer->version, answer->shards,
                    answer->uptime_ms,   answer->nodes,    answer->services};
 }
 
-Outcome<std::vector<ShardCounts>> ask_counters(nif_node* node, Timeout timeout) {
-  auto answer = ask<proto::ctrl::StatisticsAnswer>(node, proto::ctrl::Statistics{},
+Outcome<std::vector<ShardCounts>> ask_counters(Asking who, Timeout timeout) {
+  auto answer = ask<proto::ctrl::StatisticsAnswer>(who, proto::ctrl::Statistics{},
                                                    "ask the hub for its counters", timeout);
   if (!answer) return answer.failure();
   std::vector<ShardCounts> shards;
@@ -125,13 +125,13 @@ Outcome<std::vector<ShardCounts>> ask_counters(nif_node* node, Timeout timeout) 
   return shards;
 }
 
-Outcome<std::vector<ConnectionRecord>> ask_connections(nif_node* node, Timeout timeout) {
+Outcome<std::vector<ConnectionRecord>> ask_connections(Asking who, Timeout timeout) {
   const std::int64_t deadline = deadline_after(timeout);
   std::vector<ConnectionRecord> records;
   proto::ctrl::Connections request;
   for (;;) {
     const auto page = ask<proto::ctrl::ConnectionsAnswer>(
-        node, request, "ask the hub for its connections", Timeout{nif_timeout_until(deadline)});
+        who, request, "ask the hub for its connections", Timeout{nif_timeout_until(deadline)});
     if (!page) return page.failure();
     for (const auto& found : page->connections) {
       if (found.node <= request.after)
@@ -147,16 +147,52 @@ Outcome<std::vector<ConnectionRecord>> ask_connections(nif_node* node, Timeout t
   }
 }
 
-Outcome<std::vector<RouteRecord>> ask_routes(nif_node* node, Timeout timeout) {
-  const auto answer = ask<proto::ctrl::RoutesAnswer>(node, proto::ctrl::Routes{},
-                                                     "ask the hub for its routes", timeout);
-  if (!answer) return answer.failure();
-  std::vector<RouteRecord> routes;
-  for (const auto& route : answer->routes) {
-    routes.push_back(
-        {route.hub.value(), route.hub_name, route.next_hop.value(), route.cost, route.nodes});
+Outcome<std::vector<NetworkHub>> ask_hubs(Asking who, Timeout timeout) {
+  const std::int64_t deadline = deadline_after(timeout);
+  std::vector<NetworkHub> records;
+  proto::ctrl::Hubs request;
+  for (;;) {
+    const auto page = ask<proto::ctrl::HubsAnswer>(who, request, "ask the hub for those it knows",
+                                                   Timeout{nif_timeout_until(deadline)});
+    if (!page) return page.failure();
+    for (const auto& found : page->hubs) {
+      if (found.hub <= request.after) return records;  // as in ask_connections()
+      request.after = found.hub;
+      NetworkHub& hub = records.emplace_back();
+      hub.hub_id = found.hub.value();
+      hub.name = found.hub_name;
+      hub.version = found.version;
+      hub.distance = found.distance;
+      hub.cost = found.cost;
+      hub.next_hop = found.next_hop.value();
+      hub.nodes = found.nodes;
+      hub.services = found.services;
+      hub.reachable = found.reachable;
+      hub.too_far = found.too_far;
+      for (const auto& edge : found.edges) hub.edges.push_back({edge.hub.value(), edge.cost});
+    }
+    if (!page->more || page->hubs.empty()) return records;
   }
-  return routes;
+}
+
+Outcome<std::vector<LinkRecord>> ask_links(Asking who, Timeout timeout) {
+  const std::int64_t deadline = deadline_after(timeout);
+  std::vector<LinkRecord> records;
+  for (;;) {
+    const proto::ctrl::Links request{.skip = static_cast<std::uint32_t>(records.size())};
+    const auto page = ask<proto::ctrl::LinksAnswer>(who, request, "ask the hub for its links",
+                                                    Timeout{nif_timeout_until(deadline)});
+    if (!page) return page.failure();
+    for (const auto& link : page->links) {
+      const proto::ctrl::LinkCounts& counts = link.counts;
+      records.push_back(
+          {link.name, link.hub.value(), link.peer, proto::ctrl::link_state_name(link.state),
+           link.dialled, link.cost, link.rtt_us, link.clock_offset_ns, link.clock_error_ns,
+           counts.queued_bytes, counts.sent_bytes, counts.received_bytes, counts.accepted,
+           counts.delivered, counts.dropped, counts.unsure, link.last_error});
+    }
+    if (!page->more || page->links.empty()) return records;
+  }
 }
 
 Outcome<std::string> kick(nif_node* node, Peer peer, std::string_view reason, Timeout timeout) {
@@ -167,7 +203,7 @@ Outcome<std::string> kick(nif_node* node, Peer peer, std::string_view reason, Ti
                                              " are the most; shorten it"};
   }
   const proto::ctrl::Kick request{NodeId{peer.id}, std::string(reason)};
-  const auto answer = ask<proto::ctrl::KickAnswer>(node, request, "kick " + peer.text(), timeout);
+  const auto answer = ask<proto::ctrl::KickAnswer>({node}, request, "kick " + peer.text(), timeout);
   if (!answer) return answer.failure();
   return answer->remark;
 }
@@ -175,21 +211,21 @@ Outcome<std::string> kick(nif_node* node, Peer peer, std::string_view reason, Ti
 Outcome<void> reassign(nif_node* node, Peer peer, Peer new_id, Timeout timeout) {
   const proto::ctrl::Reassign request{NodeId{peer.id}, NodeId{new_id.id}};
   const std::string doing = "give " + peer.text() + " the id " + new_id.text();
-  const auto answer = ask<proto::ctrl::ReassignAnswer>(node, request, doing, timeout);
+  const auto answer = ask<proto::ctrl::ReassignAnswer>({node}, request, doing, timeout);
   if (!answer) return answer.failure();
   return {};
 }
 
 Outcome<void> drain_hub(nif_node* node, Timeout timeout) {
   const auto answer =
-      ask<proto::ctrl::DrainAnswer>(node, proto::ctrl::Drain{}, "drain the hub", timeout);
+      ask<proto::ctrl::DrainAnswer>({node}, proto::ctrl::Drain{}, "drain the hub", timeout);
   if (!answer) return answer.failure();
   return {};
 }
 
 Outcome<std::vector<HubChange>> reload_hub(nif_node* node, Timeout timeout) {
   const std::string doing = "have the hub read its configuration again";
-  auto answer = ask<proto::ctrl::ReloadAnswer>(node, proto::ctrl::Reload{}, doing, timeout);
+  auto answer = ask<proto::ctrl::ReloadAnswer>({node}, proto::ctrl::Reload{}, doing, timeout);
   if (!answer) return answer.failure();
   std::vector<HubChange> changes;
   for (auto& change : answer->changes) {
@@ -202,9 +238,35 @@ Outcome<std::vector<HubChange>> reload_hub(nif_node* node, Timeout timeout) {
 Outcome<std::string> set_hub_log_level(nif_node* node, std::string_view level, Timeout timeout) {
   const proto::ctrl::SetLogLevel request{std::string(level)};
   const auto answer =
-      ask<proto::ctrl::SetLogLevelAnswer>(node, request, "set the hub's log level", timeout);
+      ask<proto::ctrl::SetLogLevelAnswer>({node}, request, "set the hub's log level", timeout);
   if (!answer) return answer.failure();
   return answer->before;
+}
+
+namespace {
+
+template <class Request>
+Outcome<void> change_link(nif_node* node, const Request& request, const std::string& doing,
+                          Timeout timeout) {
+  const auto answer = ask<proto::ctrl::LinkChanged<Request>>({node}, request, doing, timeout);
+  if (!answer) return answer.failure();
+  return {};
+}
+
+}  // namespace
+
+Outcome<void> add_link(nif_node* node, const proto::ctrl::LinkAdd& link, Timeout timeout) {
+  return change_link(node, link, "add the link", timeout);
+}
+
+Outcome<void> remove_link(nif_node* node, std::string_view name, Timeout timeout) {
+  return change_link(node, proto::ctrl::LinkRemove{std::string(name)}, "remove the link", timeout);
+}
+
+Outcome<void> set_link_cost(nif_node* node, std::string_view name, std::uint16_t cost,
+                            Timeout timeout) {
+  return change_link(node, proto::ctrl::LinkCost{std::string(name), cost},
+                     "set the cost of the link", timeout);
 }
 
 }  // namespace gimnet::gimi

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -7,6 +8,7 @@
 #include "gimnet/gimi/outcome.hpp"
 #include "gimnet/gimi/records.hpp"
 #include "gimnet/nif.h"
+#include "proto/control/ctrl_network.hpp"
 
 // What a hub knows, as records of the C++ API. Thread safety: pure functions of the handle.
 
@@ -19,13 +21,18 @@ namespace gimnet::gimi {
 [[nodiscard]] Outcome<std::vector<ServiceRecord>> list_services(nif_node* node,
                                                                 const std::string& pattern,
                                                                 Timeout timeout);
-[[nodiscard]] Outcome<HubRecord> ask_hub(nif_node* node, Timeout timeout);
-[[nodiscard]] Outcome<std::vector<ShardCounts>> ask_counters(nif_node* node, Timeout timeout);
-/// All pages; `timeout` for them together.
-[[nodiscard]] Outcome<std::vector<ConnectionRecord>> ask_connections(nif_node* node,
-                                                                     Timeout timeout);
 
-[[nodiscard]] Outcome<std::vector<RouteRecord>> ask_routes(nif_node* node, Timeout timeout);
+/// Who asks, and which hub; 0: the own one.
+struct Asking {
+  nif_node* node = nullptr;
+  std::uint32_t hub_id = 0;
+};
+[[nodiscard]] Outcome<HubRecord> ask_hub(Asking who, Timeout timeout);
+[[nodiscard]] Outcome<std::vector<ShardCounts>> ask_counters(Asking who, Timeout timeout);
+// All pages; `timeout` for them together.
+[[nodiscard]] Outcome<std::vector<ConnectionRecord>> ask_connections(Asking who, Timeout timeout);
+[[nodiscard]] Outcome<std::vector<NetworkHub>> ask_hubs(Asking who, Timeout timeout);
+[[nodiscard]] Outcome<std::vector<LinkRecord>> ask_links(Asking who, Timeout timeout);
 
 // For administrators.
 [[nodiscard]] Outcome<std::string> kick(nif_node* node, Peer peer, std::string_view reason,
@@ -35,6 +42,11 @@ namespace gimnet::gimi {
 [[nodiscard]] Outcome<std::vector<HubChange>> reload_hub(nif_node* node, Timeout timeout);
 [[nodiscard]] Outcome<std::string> set_hub_log_level(nif_node* node, std::string_view level,
                                                      Timeout timeout);
+[[nodiscard]] Outcome<void> add_link(nif_node* node, const proto::ctrl::LinkAdd& link,
+                                     Timeout timeout);
+[[nodiscard]] Outcome<void> remove_link(nif_node* node, std::string_view name, Timeout timeout);
+[[nodiscard]] Outcome<void> set_link_cost(nif_node* node, std::string_view name, std::uint16_t cost,
+                                          Timeout timeout);
 
 /// A record of the C API.
 [[nodiscard]] NodeRecord record_of(const nif_node_record& found);

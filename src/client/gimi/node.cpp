@@ -238,18 +238,32 @@ Outcome<std::vector<ServiceRecord>> Node::services(std::string_view pattern,
                                                    Timeout timeout) const {
   return gimi::list_services(core().node(), std::string(pattern), timeout);
 }
-Outcome<HubRecord> Node::hub(Timeout timeout) const {
-  return gimi::ask_hub(core().node(), timeout);
+Outcome<HubRecord> Node::hub(Timeout timeout, std::uint32_t hub_id) const {
+  return gimi::ask_hub({core().node(), hub_id}, timeout);
 }
-Outcome<std::vector<ShardCounts>> Node::hub_counters(Timeout timeout) const {
-  return gimi::ask_counters(core().node(), timeout);
+Outcome<std::vector<ShardCounts>> Node::hub_counters(Timeout timeout, std::uint32_t hub_id) const {
+  return gimi::ask_counters({core().node(), hub_id}, timeout);
 }
-Outcome<std::vector<ConnectionRecord>> Node::hub_connections(Timeout timeout) const {
-  return gimi::ask_connections(core().node(), timeout);
+Outcome<std::vector<ConnectionRecord>> Node::hub_connections(Timeout timeout,
+                                                             std::uint32_t hub_id) const {
+  return gimi::ask_connections({core().node(), hub_id}, timeout);
 }
-
-Outcome<std::vector<RouteRecord>> Node::hub_routes(Timeout timeout) const {
-  return gimi::ask_routes(core().node(), timeout);
+Outcome<std::vector<NetworkHub>> Node::hubs(Timeout timeout, std::uint32_t hub_id) const {
+  return gimi::ask_hubs({core().node(), hub_id}, timeout);
+}
+Outcome<std::vector<LinkRecord>> Node::hub_links(Timeout timeout, std::uint32_t hub_id) const {
+  return gimi::ask_links({core().node(), hub_id}, timeout);
+}
+Outcome<void> Node::add_link(std::string_view url, std::string_view name, std::uint16_t cost,
+                             Timeout timeout) const {
+  return gimi::add_link(core().node(), {std::string(url), std::string(name), cost}, timeout);
+}
+Outcome<void> Node::remove_link(std::string_view name, Timeout timeout) const {
+  return gimi::remove_link(core().node(), name, timeout);
+}
+Outcome<void> Node::set_link_cost(std::string_view name, std::uint16_t cost,
+                                  Timeout timeout) const {
+  return gimi::set_link_cost(core().node(), name, cost, timeout);
 }
 
 Outcome<std::string> Node::kick(Peer node, std::string_view reason, Timeout timeout) const {

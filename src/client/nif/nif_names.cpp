@@ -314,21 +314,28 @@ nif_status nif_unsubscribe(nif_node* node, const char* full_name, int32_t timeou
 
 nif_status nif_request(nif_node* node, uint8_t kind, uint16_t operation, const void* content,
                        size_t size, nif_reply** reply, int32_t timeout_ms) {
+  return nif_request_of_hub(node, 0, kind, operation, content, size, reply, timeout_ms);
+}
+
+nif_status nif_request_of_hub(nif_node* node, uint32_t hub_id, uint8_t kind, uint16_t operation,
+                              const void* content, size_t size, nif_reply** reply,
+                              int32_t timeout_ms) {
   return with_waiting_node(node, [&](Node& found) -> nif_status {
     if (reply == nullptr || (content == nullptr && size > 0)) {
       return fail(NIF_BAD_ARGUMENT, "cannot ask: reply or content is NULL");
     }
     *reply = nullptr;
     if ((kind != NIF_NS && kind != NIF_CTRL) || operation >= proto::kAnswerBit ||
-        size > NIF_REQUEST_BYTES_MAX) {
-      return fail(NIF_BAD_ARGUMENT, "cannot ask: kind, operation or size is out of range");
+        size > NIF_REQUEST_BYTES_MAX || hub_id > gimnet::kHubIdMax) {
+      return fail(NIF_BAD_ARGUMENT, "cannot ask: hub, kind, operation or size is out of range");
     }
     proto::Payload request(proto::kControlHeaderSize + size);
     gimnet::store_le(request.data(), operation);
     if (size > 0) std::memcpy(request.data() + proto::kControlHeaderSize, content, size);
     auto owned = std::make_unique<OwnedReply>();
-    const nif_status status = found.requests().ask(static_cast<proto::Kind>(kind), request,
-                                                   owned->payload, deadline_after(timeout_ms));
+    const nif_status status = found.requests().ask(
+        static_cast<proto::Kind>(kind), request, owned->payload, deadline_after(timeout_ms),
+        gimnet::HubId{static_cast<std::uint16_t>(hub_id)});
     if (status != NIF_OK) return status;
     const auto body = std::span<const std::byte>(owned->payload).subspan(proto::kControlHeaderSize);
     const proto::Refusal refusal = proto::read_status(body);

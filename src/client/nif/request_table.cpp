@@ -18,9 +18,10 @@ std::uint16_t operation_of(const proto::Payload& payload) {
 }
 
 std::vector<std::byte> request_frame(proto::Kind kind, const proto::Payload& payload,
-                                     std::uint16_t number) {
+                                     std::uint16_t number, HubId hub = kOwnHub) {
   proto::FrameParts parts;
   parts.header.kind = kind;
+  parts.header.dst = make_id<NodeId>(hub, kHubIndex).value();
   std::vector<std::byte> frame(proto::kHeaderSize + payload.size());
   static_cast<void>(proto::write_frame(parts, payload, frame));
   store_le(frame.data() + proto::kHeaderSize + 2, number);
@@ -86,14 +87,15 @@ nif_status RequestTable::wait_for_answer(std::uint16_t number, proto::Payload& a
 
 /// `again`: the connection broke before the answer came.
 nif_status RequestTable::ask_once(proto::Kind kind, const proto::Payload& payload,
-                                  proto::Payload& answer, Deadline deadline, bool& again) {
+                                  proto::Payload& answer, Deadline deadline, HubId hub,
+                                  bool& again) {
   std::uint16_t number = 0;
   // Until it is posted, so that a break comes before both or behind both: what went out behind it
   // would be counted by the next hub, and not here.
   const MutexLock lock(mutex_);
   const nif_status status = wait_for_number(kind, operation_of(payload), deadline, number);
   if (status != NIF_OK) return status;
-  const bool posted = outbound_.post(request_frame(kind, payload, number));
+  const bool posted = outbound_.post(request_frame(kind, payload, number, hub));
   if (posted) return wait_for_answer(number, answer, deadline, again);
   open_.erase(number);
   again = true;
@@ -102,12 +104,12 @@ nif_status RequestTable::ask_once(proto::Kind kind, const proto::Payload& payloa
 }
 
 nif_status RequestTable::ask(proto::Kind kind, const proto::Payload& payload,
-                             proto::Payload& answer, Deadline deadline) {
+                             proto::Payload& answer, Deadline deadline, HubId hub) {
   for (;;) {
     nif_status status = outbound_.wait_connected(deadline);
     if (status != NIF_OK) return status;
     bool again = false;
-    status = ask_once(kind, payload, answer, deadline, again);
+    status = ask_once(kind, payload, answer, deadline, hub, again);
     if (status != NIF_OK || !again) return status;
     if (deadline != kNever && steady_now_ns() >= deadline) return timed_out();
   }

@@ -26,7 +26,8 @@ class RequestTable {
   /// meanwhile is waited for and asked again. NIF_TIMEOUT, NIF_NOT_CONNECTED, NIF_CLOSED,
   /// NIF_REPLACED. `payload` is a request with any number.
   [[nodiscard]] nif_status ask(proto::Kind kind, const proto::Payload& payload,
-                               proto::Payload& answer, Deadline deadline) GIMNET_EXCLUDES(mutex_);
+                               proto::Payload& answer, Deadline deadline, HubId hub = kOwnHub)
+      GIMNET_EXCLUDES(mutex_);
 
   /// Gets the answer on the library's thread; not called when the connection breaks first. Not
   /// empty.
@@ -56,8 +57,8 @@ class RequestTable {
   [[nodiscard]] std::optional<std::uint16_t> reserve(proto::Kind kind, std::uint16_t operation,
                                                      Handler handler) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status ask_once(proto::Kind kind, const proto::Payload& payload,
-                                    proto::Payload& answer, Deadline deadline, bool& again)
-      GIMNET_EXCLUDES(mutex_);
+                                    proto::Payload& answer, Deadline deadline, HubId hub,
+                                    bool& again) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] nif_status wait_for_number(proto::Kind kind, std::uint16_t operation,
                                            Deadline deadline, std::uint16_t& number)
       GIMNET_REQUIRES(mutex_);

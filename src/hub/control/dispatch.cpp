@@ -6,9 +6,10 @@
 #include "hub/control/handle/admin.hpp"
 #include "hub/control/handle/administer.hpp"
 #include "hub/control/handle/names.hpp"
+#include "hub/control/handle/network.hpp"
 #include "hub/control/handle/services.hpp"
 #include "hub/control/handle/watch.hpp"
-#include "proto/control/ctrl.hpp"
+#include "proto/control/ctrl_network.hpp"
 #include "proto/control/ns_register.hpp"
 #include "proto/control/ns_watch.hpp"
 
@@ -46,12 +47,16 @@ constexpr std::array kTable{
     TableRow{Kind::ctrl, ctrl::HubInfo::kOperation, everybody, handle_hub_info},
     TableRow{Kind::ctrl, ctrl::Statistics::kOperation, everybody, handle_statistics},
     TableRow{Kind::ctrl, ctrl::Connections::kOperation, everybody, handle_connections},
-    TableRow{Kind::ctrl, ctrl::Routes::kOperation, everybody, handle_routes},
+    TableRow{Kind::ctrl, ctrl::Hubs::kOperation, everybody, handle_hubs},
+    TableRow{Kind::ctrl, ctrl::Links::kOperation, everybody, handle_links},
     TableRow{Kind::ctrl, ctrl::Kick::kOperation, admins, handle_kick},
     TableRow{Kind::ctrl, ctrl::Reassign::kOperation, admins, handle_reassign},
     TableRow{Kind::ctrl, ctrl::Drain::kOperation, admins, handle_drain},
     TableRow{Kind::ctrl, ctrl::Reload::kOperation, admins, handle_reload},
     TableRow{Kind::ctrl, ctrl::SetLogLevel::kOperation, admins, handle_log_level},
+    TableRow{Kind::ctrl, ctrl::LinkAdd::kOperation, admins, handle_link_add},
+    TableRow{Kind::ctrl, ctrl::LinkRemove::kOperation, admins, handle_link_remove},
+    TableRow{Kind::ctrl, ctrl::LinkCost::kOperation, admins, handle_link_cost},
 };
 
 Roles mask_of(Role role) { return role == Role::admin ? admins : nodes; }

@@ -15,6 +15,7 @@ struct HubFacts {
   bool id_configured = false;   ///< and not drawn, nor the default
   proto::UniqueId unique;       ///< of its state folder
   proto::HubInstance instance;  ///< of this start
+  bool insecure = false;        ///< it may link to other machines
   std::string name;
   std::string version;
   std::size_t shards = 1;

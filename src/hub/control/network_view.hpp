@@ -36,6 +36,7 @@ struct LinkView {
   std::uint64_t accepted = 0;   ///< data frames from it
   std::uint64_t delivered = 0;  ///< data frames to it
   std::uint64_t dropped = 0;    ///< data frames for it
+  std::uint64_t unsure = 0;     ///< of these, those that may have arrived
   std::string last_error;       ///< of the last attempt or connection; "": none
 };
 
@@ -48,7 +49,9 @@ struct HubView {
   std::uint32_t cost = 0;      ///< of the way
   HubId via;                   ///< the next hub; 0: this hub, or no way
   bool reachable = false;
-  bool too_far = false;  ///< reachable, but over more links than a frame may cross
+  bool too_far = false;        ///< reachable, but over more links than a frame may cross
+  std::uint32_t nodes = 0;     ///< of another hub, as far as it is known
+  std::uint32_t services = 0;  ///< the same
   /// The neighbours that it names, with costs.
   struct Edge {
     HubId hub;

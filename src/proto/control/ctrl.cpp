@@ -43,8 +43,16 @@ const char* operation_name(std::uint16_t operation) {
       return "reload";
     case Operation::log_level:
       return "log_level";
-    case Operation::routes:
-      return "routes";
+    case Operation::hubs:
+      return "hubs";
+    case Operation::links:
+      return "links";
+    case Operation::link_add:
+      return "link_add";
+    case Operation::link_remove:
+      return "link_remove";
+    case Operation::link_cost:
+      return "link_cost";
   }
   return nullptr;
 }
@@ -149,31 +157,6 @@ ConnectionsAnswer ConnectionsAnswer::read(Fields& fields) {
     return connection;
   });
   answer.more = fields.flag(4, "more", false);
-  return answer;
-}
-
-void RoutesAnswer::write(bitestream::Writer& writer) const {
-  for (const RouteRecord& record : routes) {
-    writer.begin_nested(3);
-    writer.put_u16(1, record.hub.value());
-    put_clean_text(writer, 2, record.hub_name, kNameBytesMax);
-    writer.put_u16(3, record.next_hop.value());
-    writer.put_u32(4, record.cost);
-    writer.put_u32(5, record.nodes);
-    writer.end_nested();
-  }
-}
-RoutesAnswer RoutesAnswer::read(Fields& fields) {
-  RoutesAnswer answer;
-  answer.routes = fields.records<RouteRecord>(3, "record", [](Fields& record) {
-    RouteRecord route;
-    route.hub = HubId{record.required_number<std::uint16_t>(1, "hub id")};
-    route.hub_name = record.text(2, "hub name", kNameBytesMax);
-    route.next_hop = HubId{record.number<std::uint16_t>(3, "next hop", 0)};
-    route.cost = record.number<std::uint32_t>(4, "cost", 0);
-    route.nodes = record.number<std::uint32_t>(5, "number of nodes", 0);
-    return route;
-  });
   return answer;
 }
 

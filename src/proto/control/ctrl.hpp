@@ -9,8 +9,8 @@
 #include "proto/control/control_message.hpp"
 
 // HubCtrl, administration: the payloads of CTRL frames (docs/protocol.md, section 9), one struct
-// for each request and answer. Encode and decode with the templates of control_message.hpp. Thread
-// safety: value types.
+// for each request and answer; those about the network of hubs are in ctrl_network.hpp. Encode and
+// decode with the templates of control_message.hpp. Thread safety: value types.
 
 namespace gimnet::proto::ctrl {
 
@@ -23,7 +23,11 @@ enum class Operation : std::uint16_t {
   drain = 6,
   reload = 7,
   log_level = 8,
-  routes = 9,
+  hubs = 9,
+  links = 10,
+  link_add = 11,
+  link_remove = 12,
+  link_cost = 13,
 };
 
 [[nodiscard]] constexpr std::uint16_t request_of(Operation operation) {
@@ -34,7 +38,7 @@ enum class Operation : std::uint16_t {
 }
 
 /// Operations of requests are below this.
-inline constexpr std::size_t kRequestsEnd = 10;
+inline constexpr std::size_t kRequestsEnd = 14;
 /// The request as counters and documents name it, for example "kick"; nullptr: there is no such
 /// request.
 [[nodiscard]] const char* operation_name(std::uint16_t operation);
@@ -147,34 +151,6 @@ struct ConnectionsAnswer {
   void write(bitestream::Writer& writer) const;
   [[nodiscard]] static ConnectionsAnswer read(Fields& fields);
   friend bool operator==(const ConnectionsAnswer&, const ConnectionsAnswer&) = default;
-};
-
-// ROUTES: the hubs that this one knows, itself among them, and the way to each
-
-struct Routes {
-  static constexpr std::uint16_t kOperation = request_of(Operation::routes);
-  static constexpr const char* kName = "ROUTES";
-  void write(bitestream::Writer&) const {}
-  [[nodiscard]] static Routes read(Fields&) { return {}; }
-  friend bool operator==(const Routes&, const Routes&) = default;
-};
-
-struct RouteRecord {
-  HubId hub;
-  std::string hub_name;
-  HubId next_hop;          ///< itself for the own hub
-  std::uint32_t cost = 0;  ///< 0 for the own hub
-  std::uint32_t nodes = 0;
-  friend bool operator==(const RouteRecord&, const RouteRecord&) = default;
-};
-
-struct RoutesAnswer {
-  static constexpr std::uint16_t kOperation = answer_of(Operation::routes);
-  static constexpr const char* kName = "answer to ROUTES";
-  std::vector<RouteRecord> routes;
-  void write(bitestream::Writer& writer) const;
-  [[nodiscard]] static RoutesAnswer read(Fields& fields);
-  friend bool operator==(const RoutesAnswer&, const RoutesAnswer&) = default;
 };
 
 // What follows changes the hub: for administrators only, `denied` to everybody else.

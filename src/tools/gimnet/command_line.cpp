@@ -140,8 +140,8 @@ CommandEnding missing_action() { return wrong("action is missing: " + all_action
 std::string too_many(const ToolOptions& options, const Called& called) {
   const bool acts = options.command == Command::ctl;
   const std::string& word = acts ? options.ctl.node : options.target;
-  const bool names_node =
-      acts || options.command == Command::ping || options.command == Command::send;
+  const bool names_node = acts || options.command == Command::ping ||
+                          options.command == Command::send || options.command == Command::routes;
   if (!names_node || !is_pattern(word)) return {};
   return "'" + word + "' is a pattern, and " + called.text() + " takes one node: `gimnet nodes '" +
          word + "'` lists those that match";
@@ -151,6 +151,13 @@ std::string too_many(const ToolOptions& options, const Called& called) {
 std::string contradiction(const ToolOptions& options) {
   if (options.json && options.raw)
     return "--json and --raw contradict each other: give one of them";
+  if (options.ascii + options.dot + options.json > 1 && options.command == Command::graph)
+    return "--ascii, --dot and --json contradict each other: give one of them";
+  if (options.command == Command::status && options.all && options.hub_id != 0)
+    return "--all and --hub-id contradict each other: give one of them";
+  if (options.command == Command::ctl) {
+    if (std::string wrong = link_fault(options.ctl); !wrong.empty()) return wrong;
+  }
   if (options.command != Command::ctl && options.target.find_first_of("#+>") != std::string::npos) {
     return "'" + options.target +
            "' has a character that no name has; in patterns `*` is one part, `**` any number";

@@ -10,6 +10,8 @@
 #include <string_view>
 #include <type_traits>
 
+#include "base/ids.hpp"
+
 namespace gimnet::tool {
 namespace {
 
@@ -225,7 +227,28 @@ void add_lists(CLI::App& app, ToolOptions& options) {
   watch.add_flag("--all", options.all, "those of gimnet itself, too");
   watch.add_flag("--changes", options.changes, "only what changes, not what is there already");
   add_bounds(watch, options);
-  app.add_subcommand("status", help::kStatusAbout);
+}
+
+void add_hub_id(CLI::App& command, ToolOptions& options) {
+  command
+      .add_option("--hub-id", options.hub_id,
+                  "the hub of the network to ask, 1 to 4094, default the one that it connects to")
+      ->transform(within(std::uint32_t{1}, std::uint32_t{kHubIdMax}));
+}
+
+void add_network(CLI::App& app, ToolOptions& options) {
+  CLI::App& status = *app.add_subcommand("status", help::kStatusAbout);
+  status.add_flag("--all", options.all, "ledger and links of each hub of the network");
+  add_hub_id(status, options);
+  add_hub_id(*app.add_subcommand("hubs", help::kHubsAbout), options);
+  add_hub_id(*app.add_subcommand("links", help::kLinksAbout), options);
+  CLI::App& routes = *app.add_subcommand("routes", help::kRoutesAbout);
+  routes.add_option("node", options.target, "name or id")->required()->check(not_empty());
+  add_hub_id(routes, options);
+  CLI::App& graph = *app.add_subcommand("graph", help::kGraphAbout);
+  graph.add_flag("--ascii", options.ascii, "a line for each hub; the default");
+  graph.add_flag("--dot", options.dot, "in the language of Graphviz");
+  add_hub_id(graph, options);
 }
 
 }  // namespace
@@ -260,6 +283,7 @@ void add_commands(CLI::App& app, ToolOptions& options) {
   add_meter(app, "bw", help::kBwAbout, options);
   add_ping(app, options);
   add_lists(app, options);
+  add_network(app, options);
   add_impair(app, options.impair);
   add_ctl(app, options.ctl);
   app.require_subcommand(

@@ -41,6 +41,7 @@ Examples:
   gimnet ping B                             how far away is B?
   gimnet watch                              who comes and goes?
   gimnet nodes; gimnet services; gimnet status --json
+  gimnet hubs; gimnet links; gimnet graph   the network of hubs
   gimnet impair LISTEN TARGET --delay 80ms  relay as a bad network does
   gimnet ctl connections                    administer the hub: kick, reassign, drain, reload, log
 
@@ -160,6 +161,38 @@ inline constexpr const char* kStatusAbout = R"(Show what the hub counted.
 Examples:
   gimnet status
   gimnet status --json | jq .ledger
+  gimnet status --hub-id 2                  what another hub of the network counted
+  gimnet status --all --json | jq .exact    ledger and links of every hub, and whether the counts of the links agree
+)";
+
+inline constexpr const char* kHubsAbout = R"(List the hubs of the network, and the way to each.
+
+Examples:
+  gimnet hubs
+  gimnet hubs --json | jq '.[] | select(.reachable | not)'
+)";
+
+inline constexpr const char* kLinksAbout = R"(List the links of the hub to other hubs.
+
+Examples:
+  gimnet links
+  gimnet links --hub-id 2 --json            those of another hub of the network
+)";
+
+inline constexpr const char* kRoutesAbout =
+    R"(List the hubs on the way to a node: next hop, distance and cost, as each of them knows it.
+
+Examples:
+  gimnet routes robot
+  gimnet routes 7.17 --json
+)";
+
+inline constexpr const char* kGraphAbout = R"(Draw the hubs and their links.
+
+Examples:
+  gimnet graph                              a line for each hub
+  gimnet graph --dot | dot -Tsvg > network.svg
+  gimnet graph --json
 )";
 
 }  // namespace gimnet::tool::help
@@ -167,7 +200,7 @@ Examples:
 namespace gimnet::tool {
 
 /// All commands, by the words that name them.
-inline constexpr std::array<std::pair<std::string_view, Command>, 13> kCommands{
+inline constexpr std::array<std::pair<std::string_view, Command>, 17> kCommands{
     {{"send", Command::send},
      {"recv", Command::recv},
      {"pub", Command::pub},
@@ -179,6 +212,10 @@ inline constexpr std::array<std::pair<std::string_view, Command>, 13> kCommands{
      {"services", Command::services},
      {"watch", Command::watch},
      {"status", Command::status},
+     {"hubs", Command::hubs},
+     {"links", Command::links},
+     {"routes", Command::routes},
+     {"graph", Command::graph},
      {"impair", Command::impair},
      {"ctl", Command::ctl}}};
 

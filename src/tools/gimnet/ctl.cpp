@@ -23,6 +23,7 @@ Examples:
   gimnet --hub unix:/run/tcphub.sock ctl reassign 1.17 1.100
   gimnet --hub unix:/run/tcphub.sock ctl reload
   gimnet --hub unix:/run/tcphub.sock ctl log debug
+  gimnet --hub unix:/run/tcphub.sock ctl link add tcp://127.0.0.1:7451 --name lab
 
 Everybody may read. Changing needs the hub's Unix socket, as root or as the user that runs it.
 )";
@@ -32,12 +33,6 @@ constexpr const char* kConnectionsAbout = R"(List who is connected where, and wh
 Examples:
   gimnet ctl connections
   gimnet ctl connections --json | jq '.[] | select(.queued_bytes > 0)'
-)";
-
-constexpr const char* kRoutesAbout = R"(List the hubs that this one knows.
-
-Examples:
-  gimnet ctl routes
 )";
 
 constexpr const char* kKickAbout =
@@ -75,6 +70,31 @@ Examples:
   gimnet --hub unix:/run/tcphub.sock ctl log debug
 )";
 
+constexpr const char* kLinkAbout =
+    R"(Add a link that the hub dials, remove one, or fix what its way costs. The hub forgets that when it ends.
+
+Examples:
+  gimnet --hub unix:/run/tcphub.sock ctl link add tcp://127.0.0.1:7451 --name lab --cost 20
+  gimnet --hub unix:/run/tcphub.sock ctl link remove lab
+  gimnet --hub unix:/run/tcphub.sock ctl link cost lab 50
+  gimnet --hub unix:/run/tcphub.sock ctl link cost lab 0        measured again
+)";
+
+void add_link(CLI::App& link, CtlOptions& options) {
+  link.add_option("change", options.change, "add, remove or cost")
+      ->required()
+      ->check(CLI::IsMember({"add", "remove", "cost"}).description(""));
+  link.add_option("link", options.link, "the URL to add, or the name of a link")
+      ->required()
+      ->check(not_empty());
+  link.add_option("cost", options.cost, "of cost: 1 to 65535, or 0 for what is measured")
+      ->check(CLI::Range(0, 65'535).description(""));
+  link.add_option("--name", options.name, "of add: what people call it, default the URL")
+      ->check(not_empty());
+  link.add_option("--cost", options.cost, "of add: 1 to 65535, default what is measured")
+      ->check(CLI::Range(1, 65'535).description(""));
+}
+
 CLI::App& add(CLI::App& ctl, CtlOptions& options, const char* about, CtlAction action) {
   const std::string_view name = kCtlActions[static_cast<std::size_t>(action)];
   CLI::App& command = *ctl.add_subcommand(std::string(name), about);
@@ -90,7 +110,6 @@ void add_ctl(CLI::App& app, CtlOptions& options) {
   CLI::App& ctl = *app.add_subcommand("ctl", kCtlAbout);
   ctl.require_subcommand(1);
   add(ctl, options, kConnectionsAbout, CtlAction::connections);
-  add(ctl, options, kRoutesAbout, CtlAction::routes);
   CLI::App& kick = add(ctl, options, kKickAbout, CtlAction::kick);
   kick.add_option("node", options.node, "name or id")->required()->check(not_empty());
   kick.add_option("--reason", options.reason, "told to the node and to the log, at most 256 bytes");
@@ -105,31 +124,21 @@ void add_ctl(CLI::App& app, CtlOptions& options) {
   log.add_option("level", options.level, "error, warning, info, debug or off")
       ->required()
       ->check(not_empty());
+  add_link(add(ctl, options, kLinkAbout, CtlAction::link), options);
+}
+
+std::string link_fault(const CtlOptions& options) {
+  if (options.action != CtlAction::link) return {};
+  if (options.change == "cost" && !options.cost)
+    return "cost is missing: 1 to 65535, or 0 for what is measured";
+  if (options.change == "remove" && options.cost)
+    return "a link that is removed has no cost: leave it out";
+  if (options.change != "add" && !options.name.empty())
+    return "--name is for a link that is added: leave it out";
+  return {};
 }
 
 namespace {
-
-std::string json_of(const std::vector<RouteRecord>& routes) {
-  JsonWriter json;
-  json.begin_array();
-  for (const RouteRecord& route : routes) {
-    json.begin_object().member("hub_id", route.hub_id).member("name", route.name);
-    json.member("next_hop", route.next_hop)
-        .member("cost", route.cost)
-        .member("nodes", route.nodes)
-        .end_object();
-  }
-  return json.end_array().str() + "\n";
-}
-
-std::string table_of(const std::vector<RouteRecord>& routes) {
-  Table table({"HUB", "NAME", "NEXT", "COST", "NODES"});
-  for (const RouteRecord& route : routes) {
-    table.add({std::to_string(route.hub_id), route.name, std::to_string(route.next_hop),
-               std::to_string(route.cost), std::to_string(route.nodes)});
-  }
-  return table.text();
-}
 
 std::string json_of(const std::vector<HubChange>& changes) {
   JsonWriter json;
@@ -180,13 +189,6 @@ ExitCode connections(ToolSession& session) {
   if (!found) return session.fail(found.failure());
   session.output().write(session.options().json ? tool::json_of(*found)
                                                 : tool::text_of(*found, session.paint()));
-  return session.finish();
-}
-
-ExitCode routes(ToolSession& session) {
-  const auto found = session.node().hub_routes();
-  if (!found) return session.fail(found.failure());
-  session.output().write(session.options().json ? json_of(*found) : table_of(*found));
   return session.finish();
 }
 
@@ -246,9 +248,21 @@ ExitCode log(ToolSession& session) {
   return done(session, {}, "log level " + level + ", before " + *before);
 }
 
-bool only_reads(CtlAction action) {
-  return action == CtlAction::connections || action == CtlAction::routes;
+ExitCode link(ToolSession& session) {
+  const CtlOptions& ctl = session.options().ctl;
+  const std::uint16_t cost = ctl.cost.value_or(0);
+  const Outcome<void> outcome =
+      ctl.change == "add"      ? session.node().add_link(ctl.link, ctl.name, cost)
+      : ctl.change == "remove" ? session.node().remove_link(ctl.link)
+                               : session.node().set_link_cost(ctl.link, cost);
+  const std::string words = ctl.change == "add"      ? "dialling " + ctl.link
+                            : ctl.change == "remove" ? "removed " + ctl.link
+                            : cost == 0 ? "the cost of " + ctl.link + " is measured now"
+                                        : ctl.link + " costs " + std::to_string(cost) + " now";
+  return done(session, outcome, words);
 }
+
+bool only_reads(CtlAction action) { return action == CtlAction::connections; }
 
 }  // namespace
 
@@ -268,8 +282,8 @@ ExitCode run_ctl(ToolSession& session) {
   switch (action) {
     case CtlAction::connections:
       return connections(session);
-    case CtlAction::routes:
-      return routes(session);
+    case CtlAction::link:
+      return link(session);
     case CtlAction::kick:
       return kick(session);
     case CtlAction::reassign:

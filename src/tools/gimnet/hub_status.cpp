@@ -4,6 +4,7 @@
 #include <unordered_map>
 
 #include "tools/gimnet/json_writer.hpp"
+#include "tools/gimnet/network.hpp"
 #include "tools/gimnet/session.hpp"
 #include "tools/gimnet/table.hpp"
 #include "tools/gimnet/watch.hpp"
@@ -32,11 +33,6 @@ void write_parts(JsonWriter& json, const Ledger& ledger) {
   json.member("delivered", ledger.delivered)
       .member("dropped", ledger.dropped)
       .member("queued", static_cast<std::int64_t>(ledger.queued));
-}
-
-void write(JsonWriter& json, const Ledger& ledger) {
-  write_parts(json, ledger);
-  json.member("exact", ledger.exact()).end_object();
 }
 
 void write(JsonWriter& json, const HubRecord& hub) {
@@ -94,6 +90,19 @@ std::string connections_table(const std::vector<ConnectionRecord>& connections, 
 
 }  // namespace
 
+void write(JsonWriter& json, const Ledger& ledger) {
+  write_parts(json, ledger);
+  json.member("exact", ledger.exact()).end_object();
+}
+
+std::string text_of(const Ledger& ledger) {
+  return "ledger: " + std::to_string(ledger.accepted) + " accepted + " +
+         std::to_string(ledger.copies) + " copies = " + std::to_string(ledger.delivered) +
+         " delivered + " + std::to_string(ledger.dropped) + " dropped + " +
+         std::to_string(ledger.queued) + " queued" +
+         (ledger.exact() ? "" : " (not balanced: frames are on their way)");
+}
+
 Counters summed(const std::vector<ShardCounts>& shards) {
   Counters sums;
   for (const ShardCounts& shard : shards) {
@@ -148,11 +157,7 @@ std::string text_of(const HubStatus& status, Paint paint) {
       status.hub.version + ", up " + std::to_string(status.hub.uptime_ms / 1000) + " s, " +
       std::to_string(status.hub.shards) + " shards, " + std::to_string(status.hub.nodes) +
       " nodes, " + std::to_string(status.hub.services) + " services\n";
-  text += "ledger: " + std::to_string(ledger.accepted) + " accepted + " +
-          std::to_string(ledger.copies) + " copies = " + std::to_string(ledger.delivered) +
-          " delivered + " + std::to_string(ledger.dropped) + " dropped + " +
-          std::to_string(ledger.queued) + " queued" +
-          (ledger.exact() ? "\n" : " (not balanced: frames are on their way)\n");
+  text += text_of(ledger) + "\n";
   for (const auto& [name, value] : counters) {
     if (name.starts_with(kDropped) && value != 0)
       text += paint("  " + name + ": " + std::to_string(value), Tone::bad) + "\n";
@@ -263,11 +268,13 @@ ExitCode run_services(ToolSession& session) {
 
 ExitCode run_status(ToolSession& session) {
   if (const auto ending = session.join_to_look()) return *ending;
-  const auto hub = session.node().hub();
+  if (session.options().all) return run_status_of_all(session);
+  const std::uint32_t hub_id = session.options().hub_id;
+  const auto hub = session.node().hub(Timeout{5000}, hub_id);
   if (!hub) return session.fail(hub.failure());
-  const auto connections = session.node().hub_connections();
+  const auto connections = session.node().hub_connections(Timeout{5000}, hub_id);
   if (!connections) return session.fail(connections.failure());
-  const auto shards = session.node().hub_counters();
+  const auto shards = session.node().hub_counters(Timeout{5000}, hub_id);
   if (!shards) return session.fail(shards.failure());
   const HubStatus status{*hub, *shards, *connections};
   session.output().write(session.options().json ? json_of(status)

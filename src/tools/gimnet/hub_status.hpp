@@ -11,6 +11,8 @@
 
 namespace gimnet::tool {
 
+class JsonWriter;
+
 /// A hub's account of itself at one moment. Thread safety: a value type.
 struct HubStatus {
   HubRecord hub;
@@ -35,6 +37,9 @@ struct Ledger {
   [[nodiscard]] bool exact() const { return accepted + copies == delivered + dropped + queued; }
 };
 [[nodiscard]] Ledger ledger_of(const Counters& counters);
+/// As an object with `exact`, or "ledger: ..." in a line without its end.
+void write(JsonWriter& json, const Ledger& ledger);
+[[nodiscard]] std::string text_of(const Ledger& ledger);
 
 /// One object and a newline.
 [[nodiscard]] std::string json_of(const HubStatus& status);

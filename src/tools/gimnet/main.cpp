@@ -4,6 +4,7 @@
 
 #include "base/standard_streams.hpp"
 #include "tools/gimnet/command_line.hpp"
+#include "tools/gimnet/network.hpp"
 #include "tools/gimnet/session.hpp"
 
 namespace {
@@ -37,6 +38,14 @@ ExitCode run(const ToolOptions& options) {
       return run_watch(session);
     case Command::status:
       return run_status(session);
+    case Command::hubs:
+      return run_hubs(session);
+    case Command::links:
+      return run_links(session);
+    case Command::routes:
+      return run_routes(session);
+    case Command::graph:
+      return run_graph(session);
     case Command::ctl:
       return run_ctl(session);
     case Command::impair:

@@ -24,6 +24,10 @@ enum class Command : std::uint8_t {
   services,
   watch,
   status,
+  hubs,
+  links,
+  routes,
+  graph,
   impair,
   ctl
 };
@@ -50,6 +54,9 @@ struct ToolOptions {
   bool raw = false;
   bool all = false;
   bool changes = false;
+  std::uint32_t hub_id = 0;  ///< of the hub to ask; 0: the own one
+  bool dot = false;
+  bool ascii = false;
   std::uint64_t count = 0;  ///< 0: no end
   double seconds = 0.0;     ///< 0: no end
   double window_s = 5.0;

@@ -61,7 +61,11 @@ std::string wrong_call(const Node& node, const Publisher& publisher,
   if (!is_forked(node.hub())) return "hub";
   if (!is_forked(node.hub_counters())) return "hub_counters";
   if (!is_forked(node.hub_connections())) return "hub_connections";
-  if (!is_forked(node.hub_routes())) return "hub_routes";
+  if (!is_forked(node.hubs())) return "hubs";
+  if (!is_forked(node.hub_links())) return "hub_links";
+  if (!is_forked(node.add_link("unix:/a"))) return "add_link";
+  if (!is_forked(node.remove_link("a"))) return "remove_link";
+  if (!is_forked(node.set_link_cost("a", 1))) return "set_link_cost";
   if (!is_forked(node.kick(Peer{1}))) return "kick";
   if (!is_forked(node.reassign(Peer{1}, Peer{2}))) return "reassign";
   if (!is_forked(node.drain_hub())) return "drain_hub";

@@ -4,6 +4,8 @@
 
 #include <map>
 
+#include "proto/control/ctrl_network.hpp"
+
 namespace gimnet::hub {
 namespace {
 
@@ -56,7 +58,7 @@ TEST(CounterNames, RequestsAreListedByOperationAndRefusalsByStatus) {
   counters.count(proto::Kind::ns, proto::ns::Resolve::kOperation, proto::Status::not_found);
   counters.count(proto::Kind::ns, 0x7fff, proto::Status::not_supported);
   counters.count(proto::Kind::ctrl, proto::ctrl::Statistics::kOperation, proto::Status::done);
-  counters.count(proto::Kind::ctrl, proto::ctrl::Routes::kOperation, proto::Status::done);
+  counters.count(proto::Kind::ctrl, proto::ctrl::Hubs::kOperation, proto::Status::done);
   counters.count(proto::Kind::ctrl, proto::ctrl::Kick::kOperation, proto::Status::denied);
   counters.count(proto::Kind::ctrl, proto::ctrl::kRequestsEnd, proto::Status::not_supported);
   counters.count(proto::Kind::ctrl, 0, proto::Status::not_supported);
@@ -69,7 +71,7 @@ TEST(CounterNames, RequestsAreListedByOperationAndRefusalsByStatus) {
   EXPECT_FALSE(all.contains("names.refused.done"));
   EXPECT_EQ(all.at("names.refused.denied"), 0u);
   EXPECT_EQ(all.at("ctrl.statistics"), 1u);
-  EXPECT_EQ(all.at("ctrl.routes"), 1u);
+  EXPECT_EQ(all.at("ctrl.hubs"), 1u);
   EXPECT_EQ(all.at("ctrl.kick"), 1u);
   EXPECT_EQ(all.at("ctrl.reload"), 0u);
   EXPECT_EQ(all.at("ctrl.unknown"), 2u);

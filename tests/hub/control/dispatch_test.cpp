@@ -9,7 +9,7 @@
 #include "hub/control/handle/admin.hpp"
 #include "hub/control/handle/administer.hpp"
 #include "hub/control/handle/names.hpp"
-#include "proto/control/ctrl.hpp"
+#include "proto/control/ctrl_network.hpp"
 #include "proto/control/ns.hpp"
 #include "tests/hub/control/support/test_conductor.hpp"
 
@@ -74,10 +74,12 @@ TEST(Dispatch, SkipsTheExtensionsOfARequest) {
 TEST(Dispatch, GrantsEachRoleExactlyWhatItMay) {
   namespace ctrl = proto::ctrl;
   const std::set<std::uint16_t> known{ctrl::HubInfo::kOperation, ctrl::Statistics::kOperation,
-                                      ctrl::Connections::kOperation, ctrl::Routes::kOperation};
-  const std::set<std::uint16_t> changing{ctrl::Kick::kOperation, ctrl::Reassign::kOperation,
-                                         ctrl::Drain::kOperation, ctrl::Reload::kOperation,
-                                         ctrl::SetLogLevel::kOperation};
+                                      ctrl::Connections::kOperation, ctrl::Hubs::kOperation,
+                                      ctrl::Links::kOperation};
+  const std::set<std::uint16_t> changing{ctrl::Kick::kOperation,        ctrl::Reassign::kOperation,
+                                         ctrl::Drain::kOperation,       ctrl::Reload::kOperation,
+                                         ctrl::SetLogLevel::kOperation, ctrl::LinkAdd::kOperation,
+                                         ctrl::LinkRemove::kOperation,  ctrl::LinkCost::kOperation};
   const Handler unknown = handler_for(Role::admin, Kind::ctrl, 0xffff);
   for (std::uint32_t operation = 0; operation <= 0xffff; ++operation) {
     const auto number = static_cast<std::uint16_t>(operation);

@@ -54,8 +54,6 @@ TEST(CtrlMessages, AreDecodedAndWrittenAsTheVectorsSay) {
                                     true,
                                     {4096, 100, 1200, 10, 160, 3}}},
                                   false});
-  expect_request("ctrl/routes", 9, Routes{});
-  expect_answer("ctrl/routes_answer", 9, RoutesAnswer{{{HubId{7}, "lab", HubId{7}, 0, 3}}});
 }
 
 TEST(CtrlMessages, ThatChangeTheHubAreAsTheVectorsSay) {

@@ -219,29 +219,28 @@ class Administration(Case):
         self.assertIn("accepted", fields(shards[0][2]))
         records = [fields(record) for record in every(made.ask(CTRL, 3), 3)]
         self.assertEqual([(record[1], record[2], record[4]) for record in records], [(made.id, "one", "tcp")])
-        routes = [fields(record) for record in every(made.ask(CTRL, 9), 3)]
-        self.assertEqual([(record[1], record[3], record[4]) for record in routes], [(5, 5, 0)])
+        hubs = [fields(record) for record in every(made.ask(CTRL, 9), 3)]
+        self.assertEqual([(record[1], record[3], record[4]) for record in hubs], [(5, 5, 0)])
+        self.assertEqual([(record[5], record[7], record[8], record[9]) for record in hubs], [(1, 0, True, False)])
+        self.assertEqual(every(made.ask(CTRL, 9, put(4, U16, 5)), 3), [])
+        self.assertEqual(every(made.ask(CTRL, 10), 3), [])
 
     def test_changing_is_denied_to_nodes(self):
         made = self.stranger(self.hub(), "one")
         for operation, body in ((4, u32(3, made.id)), (5, u32(3, made.id) + u32(4, made.id + 1)), (6, b""), (7, b""),
-                                (8, put(3, TEXT, "debug"))):
+                                (8, put(3, TEXT, "debug")), (11, put(3, TEXT, "unix:/a")), (12, put(3, TEXT, "a")),
+                                (13, put(3, TEXT, "a"))):
             with self.assertRaises(Denied) as denied:
                 made.ask(CTRL, operation, body)
             self.assertEqual(denied.exception.args[0], 5)
             self.assertIn("Unix socket", denied.exception.args[1])
 
-    def test_routes(self):
-        hub = self.hub(hub_id=5)
-        made = self.stranger(hub, "one")
-        routes = [fields(record) for record in every(made.ask(CTRL, 9), 3)]
-        self.assertEqual([(route[1], route.get(4, 0), route[5]) for route in routes], [(5, 0, 1)])
-
     def test_changing_is_for_administrators(self):
         hub = self.hub()
         one, two = self.stranger(hub, "one"), self.stranger(hub, "two")
         for operation, body in ((4, u32(3, two.id)), (5, u32(3, two.id) + u32(4, 7 << 20 | 500)), (6, b""), (7, b""),
-                                (8, put(3, TEXT, "debug"))):
+                                (8, put(3, TEXT, "debug")), (11, put(3, TEXT, "unix:/a")), (12, put(3, TEXT, "a")),
+                                (13, put(3, TEXT, "a"))):
             with self.assertRaises(Denied) as denied:
                 one.ask(CTRL, operation, body)
             self.assertEqual(denied.exception.args[0], 5)

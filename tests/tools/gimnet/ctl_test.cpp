@@ -29,7 +29,6 @@ CtlOptions ctl(const std::vector<const char*>& words) {
 
 TEST(CtlOptions, EveryActionIsUnderstood) {
   EXPECT_EQ(ctl({"ctl", "connections"}).action, CtlAction::connections);
-  EXPECT_EQ(ctl({"ctl", "routes"}).action, CtlAction::routes);
   EXPECT_EQ(ctl({"ctl", "drain"}).action, CtlAction::drain);
   EXPECT_EQ(ctl({"ctl", "reload"}).action, CtlAction::reload);
   const CtlOptions kick = ctl({"ctl", "kick", "robot", "--reason", "it stands in the way"});
@@ -40,6 +39,40 @@ TEST(CtlOptions, EveryActionIsUnderstood) {
   EXPECT_EQ(reassign.action, CtlAction::reassign);
   EXPECT_EQ(reassign.new_id, "7.100");
   EXPECT_EQ(ctl({"ctl", "log", "debug"}).level, "debug");
+}
+
+TEST(CtlOptions, ChangesOfLinksAreUnderstood) {
+  const CtlOptions add = ctl({"ctl", "link", "add", "tcp://h:1", "--name", "lab", "--cost", "20"});
+  EXPECT_EQ(add.action, CtlAction::link);
+  EXPECT_EQ(add.change, "add");
+  EXPECT_EQ(add.link, "tcp://h:1");
+  EXPECT_EQ(add.name, "lab");
+  EXPECT_EQ(add.cost, 20);
+  EXPECT_FALSE(ctl({"ctl", "link", "add", "unix:/a"}).cost);
+  EXPECT_EQ(ctl({"ctl", "link", "remove", "lab"}).link, "lab");
+  EXPECT_EQ(ctl({"ctl", "link", "cost", "lab", "65535"}).cost, 65'535);
+  EXPECT_EQ(ctl({"ctl", "link", "cost", "lab", "0"}).cost, 0);
+}
+
+TEST(CtlOptions, WrongChangesOfLinksAreTold) {
+  const auto fault = [](const std::vector<const char*>& words) {
+    const auto parsed = parse(words);
+    EXPECT_TRUE(std::holds_alternative<CommandEnding>(parsed));
+    const auto* ending = std::get_if<CommandEnding>(&parsed);
+    if (ending == nullptr) return std::string{};
+    EXPECT_EQ(ending->code, ExitCode::usage);
+    return ending->text;
+  };
+  EXPECT_THAT(fault({"ctl", "link"}), HasSubstr("change is missing: add, remove or cost"));
+  EXPECT_THAT(fault({"ctl", "link", "ad", "x"}),
+              HasSubstr("'ad' is no value for change: add, remove or cost"));
+  EXPECT_THAT(fault({"ctl", "link", "add"}), HasSubstr("link is missing: the URL to add"));
+  EXPECT_THAT(fault({"ctl", "link", "cost", "lab"}), HasSubstr("cost is missing: 1 to 65535"));
+  EXPECT_THAT(fault({"ctl", "link", "cost", "lab", "65536"}), HasSubstr("'65536' is no value"));
+  EXPECT_THAT(fault({"ctl", "link", "add", "unix:/a", "--cost", "0"}),
+              HasSubstr("'0' is no value for --cost: of add: 1 to 65535"));
+  EXPECT_THAT(fault({"ctl", "link", "remove", "lab", "5"}), HasSubstr("has no cost"));
+  EXPECT_THAT(fault({"ctl", "link", "remove", "lab", "--name", "x"}), HasSubstr("--name is for"));
 }
 
 TEST(CtlOptions, OptionsOfAllCommandsStandAnywhere) {

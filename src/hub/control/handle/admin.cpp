@@ -78,11 +78,6 @@ ctrl::ConnectionsAnswer connections(const HandlerContext& context,
   return answer;
 }
 
-ctrl::RoutesAnswer routes(const HandlerContext& context) {
-  const auto nodes = static_cast<std::uint32_t>(context.membership.sessions().all().size());
-  return {{{context.facts.id, context.facts.name, context.facts.id, 0, nodes}}};
-}
-
 }  // namespace
 
 proto::Payload handle_hub_info(HandlerContext& context, const Request& request) {
@@ -100,12 +95,6 @@ proto::Payload handle_statistics(HandlerContext& context, const Request& request
 proto::Payload handle_connections(HandlerContext& context, const Request& request) {
   return answer_to<ctrl::Connections>(request, [&context](const ctrl::Connections& wanted) {
     return Result<ctrl::ConnectionsAnswer, proto::Refusal>(connections(context, wanted));
-  });
-}
-
-proto::Payload handle_routes(HandlerContext& context, const Request& request) {
-  return answer_to<ctrl::Routes>(request, [&context](const ctrl::Routes&) {
-    return Result<ctrl::RoutesAnswer, proto::Refusal>(routes(context));
   });
 }
 

@@ -9,6 +9,5 @@ namespace gimnet::hub {
 [[nodiscard]] proto::Payload handle_hub_info(HandlerContext& context, const Request& request);
 [[nodiscard]] proto::Payload handle_statistics(HandlerContext& context, const Request& request);
 [[nodiscard]] proto::Payload handle_connections(HandlerContext& context, const Request& request);
-[[nodiscard]] proto::Payload handle_routes(HandlerContext& context, const Request& request);
 
 }  // namespace gimnet::hub

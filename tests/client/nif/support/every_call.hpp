@@ -19,7 +19,7 @@ struct Call {
 };
 
 // One part of a name, so that the checks of arguments are passed.
-inline constexpr std::array<Call, 30> kCalls{{
+inline constexpr std::array<Call, 31> kCalls{{
     {"nif_get_info",
      [](nif_node* node) {
        nif_info info{};
@@ -114,6 +114,16 @@ inline constexpr std::array<Call, 30> kCalls{{
      },
      [](nif_node* node) {
        return nif_request(node, NIF_CTRL, NIF_CTRL_HUB_INFO, nullptr, 5, nullptr, 0);
+     },
+     true},
+    {"nif_request_of_hub",
+     [](nif_node* node) {
+       nif_reply* reply = nullptr;
+       return nif_request_of_hub(node, 0, NIF_CTRL, NIF_CTRL_HUB_INFO, nullptr, 0, &reply, 0);
+     },
+     [](nif_node* node) {
+       nif_reply* reply = nullptr;
+       return nif_request_of_hub(node, 4'095, NIF_CTRL, NIF_CTRL_HUB_INFO, nullptr, 0, &reply, 0);
      },
      true},
     {"nif_ping_hub", [](nif_node* node) { return nif_ping_hub(node, nullptr, nullptr, 0); },
