@@ -369,6 +369,9 @@ class Node {
   /// not_delivered (no such node, no way to it), closed.
   Outcome<std::int64_t> ping(Peer to, Timeout timeout = Timeout{1000}, Lane lane = Lane::normal,
                              BytesView echo = {}) const;
+  /// As ping(), with the way that the answer came.
+  Outcome<TracedPing> trace(Peer to, Timeout timeout = Timeout{1000},
+                            Lane lane = Lane::normal) const;
 
  private:
   explicit Node(std::shared_ptr<gimi::Core> core) : core_(std::move(core)) {}

@@ -4,7 +4,7 @@
 import json
 import unittest
 
-from support.processes import Hub, run_gimnet
+from support.processes import Hub, run_gimnet, start_recv
 from support.wire import Client
 
 
@@ -50,6 +50,18 @@ class Alone(unittest.TestCase):
         (hub,) = status["hubs"]
         self.assertEqual((hub["id"], hub["name"], hub["links"]), (7, "hub-7", []))
         self.assertIn("accepted", hub["ledger"])
+
+    def test_a_trace_has_the_hub(self):
+        start_recv(self, self.hub, "B")
+        trace = self.json("trace", "B", "-c", "3", "-i", "0.01")
+        (hop,) = trace["hops"]
+        self.assertEqual((hop["hub"], hop["clock_offset_us"], hop["clock_error_us"]), (7, 0, 0))
+        self.assertTrue(0 <= hop["delay_us"]["p50"] <= hop["delay_us"]["p99"] <= trace["round_trip_us"]["p99"], trace)
+        self.assertEqual((trace["sent"], trace["lost"]), (3, 0))
+        silent = run_gimnet(self.hub, "trace", "robot", "-c", "1", "-W", "0.05")
+        self.assertEqual(silent.code, 5, "its library does not answer")
+        self.assertIn("robot answered none of 1 pings", silent.err)
+        self.assertEqual(run_gimnet(self.hub, "trace", "7.999", "-c", "1").code, 4)
 
     def test_text_is_for_people(self):
         for words, part in ((("hubs",), "reachable"), (("links",), "LAST ERROR"), (("graph",), "7 hub-7"),

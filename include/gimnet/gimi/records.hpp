@@ -128,6 +128,21 @@ struct NetworkHub {
   std::vector<Edge> edges;
 };
 
+/// When one hub had a message, by that hub's clock, in ns since 1970.
+struct TraceHop {
+  std::uint32_t hub_id = 0;
+  std::int64_t arrival_ns = 0;
+  std::int64_t departure_ns = 0;
+};
+
+/// A ping whose answer was traced.
+struct TracedPing {
+  std::int64_t round_trip_ns = 0;
+  /// The hubs that the answer passed, in its order, the first 8. Empty: the other library answers
+  /// without a trace.
+  std::vector<TraceHop> way_back;
+};
+
 /// A link of a hub to another one.
 struct LinkRecord {
   std::string name;

@@ -165,14 +165,15 @@ NodeState Core::state_now() const {
   return state;
 }
 
-Outcome<std::int64_t> Core::ping(Peer to, Timeout timeout, Lane lane, BytesView echo) {
+Outcome<TracedPing> Core::ping(Peer to, Timeout timeout, Lane lane, BytesView echo, bool traced) {
   const std::int64_t deadline = deadline_after(timeout);
   std::vector<std::byte> data(proto::gimi::kPingTimeSize + echo.size());
   store_le(data.data(), wall_now_ns());
   std::ranges::copy(echo.span(), data.begin() + proto::gimi::kPingTimeSize);
   const std::uint32_t number = uplink_.next_ping();
   pings_.expect(number, to);
-  const Envelope envelope{to.id, NIF_UNICAST, NIF_POLICY_DEFAULT, lane, {}, 0, NIF_FLAG_REPORT};
+  Envelope envelope{to.id, NIF_UNICAST, NIF_POLICY_DEFAULT, lane, {}, 0, NIF_FLAG_REPORT};
+  if (traced) envelope.trace_slots = kTraceHopsMax;
   const nif_status status =
       uplink_.transmit(envelope, {number, proto::gimi::Operation::ping, 0, 0, pings_.epoch()},
                        false, data, nif_timeout(timeout));

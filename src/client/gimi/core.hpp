@@ -41,7 +41,8 @@ class Core {
   [[nodiscard]] ServiceTable& services() { return services_; }
   [[nodiscard]] WatchTable& watches() { return watches_; }
   [[nodiscard]] LostCounts lost() const;
-  [[nodiscard]] Outcome<std::int64_t> ping(Peer to, Timeout timeout, Lane lane, BytesView echo);
+  [[nodiscard]] Outcome<TracedPing> ping(Peer to, Timeout timeout, Lane lane, BytesView echo,
+                                         bool traced);
 
  private:
   explicit Core(const NodeOptions& options);

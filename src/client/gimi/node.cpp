@@ -286,7 +286,14 @@ Outcome<std::int64_t> Node::ping(Peer to, Timeout timeout, Lane lane, BytesView 
   if (gimi::is_every_node(to)) {
     return Failure{Status::bad_argument, to.text() + " cannot be pinged: this id means all nodes"};
   }
-  return at_home(core().home(), [&] { return core().ping(to, timeout, lane, echo); });
+  const auto answer =
+      at_home(core().home(), [&] { return core().ping(to, timeout, lane, echo, false); });
+  if (!answer) return answer.failure();
+  return answer->round_trip_ns;
+}
+
+Outcome<TracedPing> Node::trace(Peer to, Timeout timeout, Lane lane) const {
+  return at_home(core().home(), [&] { return core().ping(to, timeout, lane, {}, true); });
 }
 
 }  // namespace gimnet

@@ -1,5 +1,7 @@
 #include "client/gimi/ping_table.hpp"
 
+#include <utility>
+
 #include "client/gimi/ending.hpp"
 
 namespace gimnet::gimi {
@@ -14,8 +16,7 @@ void PingTable::forget(std::uint32_t number) {
   waiting_.erase(number);
 }
 
-Outcome<std::int64_t> PingTable::wait(std::uint32_t number, std::int64_t deadline,
-                                      Timeout timeout) {
+Outcome<TracedPing> PingTable::wait(std::uint32_t number, std::int64_t deadline, Timeout timeout) {
   const MutexLock lock(mutex_);
   const auto place = waiting_.find(number);
   if (place == waiting_.end()) return Failure{Status::bad_argument, "no such ping"};
@@ -35,12 +36,12 @@ Outcome<std::int64_t> PingTable::wait(std::uint32_t number, std::int64_t deadlin
   return answer;
 }
 
-void PingTable::on_pong(std::uint32_t number, Peer from) {
+void PingTable::on_pong(std::uint32_t number, Peer from, std::vector<TraceHop> way) {
   const std::int64_t now = steady_now_ns();
   const MutexLock lock(mutex_);
   const auto place = waiting_.find(number);
   if (place == waiting_.end() || place->second.peer != from) return;
-  place->second.answer = now - place->second.sent_ns;
+  place->second.answer = TracedPing{now - place->second.sent_ns, std::move(way)};
   answered_.notify_all();
 }
 

@@ -4,12 +4,14 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "base/mutex.hpp"
 #include "client/gimi/ending.hpp"
 #include "client/gimi/uplink.hpp"
 #include "gimnet/gimi/message.hpp"
 #include "gimnet/gimi/outcome.hpp"
+#include "gimnet/gimi/records.hpp"
 
 namespace gimnet::gimi {
 
@@ -19,14 +21,15 @@ class PingTable {
   /// In each PING, and in the PONG that answers it.
   [[nodiscard]] std::uint32_t epoch() const { return epoch_; }
   void expect(std::uint32_t number, Peer peer) GIMNET_EXCLUDES(mutex_);
-  /// The round trip in ns, or why there is none by `deadline`, which `timeout` led to. The number
-  /// is forgotten.
-  [[nodiscard]] Outcome<std::int64_t> wait(std::uint32_t number, std::int64_t deadline,
-                                           Timeout timeout) GIMNET_EXCLUDES(mutex_);
+  /// The round trip, or why there is none by `deadline`, which `timeout` led to. The number is
+  /// forgotten.
+  [[nodiscard]] Outcome<TracedPing> wait(std::uint32_t number, std::int64_t deadline,
+                                         Timeout timeout) GIMNET_EXCLUDES(mutex_);
   /// The PING was not sent.
   void forget(std::uint32_t number) GIMNET_EXCLUDES(mutex_);
 
-  void on_pong(std::uint32_t number, Peer from) GIMNET_EXCLUDES(mutex_);
+  void on_pong(std::uint32_t number, Peer from, std::vector<TraceHop> way = {})
+      GIMNET_EXCLUDES(mutex_);
   /// The hub could not deliver it.
   void on_lost(std::uint32_t number, const std::string& why) GIMNET_EXCLUDES(mutex_);
   /// No answer comes any more.
@@ -36,7 +39,7 @@ class PingTable {
   struct Waiting {
     Peer peer;
     std::int64_t sent_ns = 0;
-    std::optional<Outcome<std::int64_t>> answer;
+    std::optional<Outcome<TracedPing>> answer;
   };
   const std::uint32_t epoch_ = Uplink::draw_epoch();
 

@@ -5,10 +5,12 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "client/gimi/loss_tally.hpp"
 #include "client/gimi/message.hpp"
 #include "proto/control/control_message.hpp"
+#include "proto/frame/extensions.hpp"
 #include "proto/frame/frame_header.hpp"
 
 namespace gimnet::gimi {
@@ -24,6 +26,21 @@ std::string plain_words(std::string_view sentence) {
   std::string words(sentence.substr(0, kPeerWordsMax));
   std::ranges::replace_if(words, [](char c) { return c < ' ' || c > '~'; }, '?');
   return words;
+}
+
+std::span<const std::byte> extensions_of(const nif_incoming& in) {
+  return {static_cast<const std::byte*>(in.extensions), in.extensions_size};
+}
+
+/// The hubs that a traced message passed.
+std::vector<TraceHop> way_of(const nif_incoming& in) {
+  std::vector<TraceHop> way;
+  const auto trace = proto::find_trace(extensions_of(in));
+  for (std::size_t i = 0; trace && i < trace->used(); ++i) {
+    const proto::TraceSlot slot = trace->slot(i);
+    way.push_back({slot.hub.value(), slot.arrival_ns, slot.departure_ns});
+  }
+  return way;
 }
 
 StreamName stream_of(const nif_incoming& in, std::uint32_t peer, std::uint32_t group) {
@@ -96,7 +113,7 @@ nif_verdict Reception::on_message(const nif_incoming& in) {
       return NIF_DONE;
     case Operation::pong:
       if (view->header.epoch == pings_.epoch())
-        pings_.on_pong(view->header.sequence, Peer{in.from});
+        pings_.on_pong(view->header.sequence, Peer{in.from}, way_of(in));
       return NIF_DONE;
     default:
       inbox_.count_dropped();
@@ -212,7 +229,8 @@ void Reception::on_ping(const nif_incoming& in, const proto::gimi::MessageView& 
       clerk_.acknowledge(name, lane, view.header) != NIF_OK) {
     return;
   }
-  const Envelope envelope{in.from, NIF_UNICAST, NIF_POLICY_DEFAULT, lane, name.key, 0, 0};
+  Envelope envelope{in.from, NIF_UNICAST, NIF_POLICY_DEFAULT, lane, name.key, 0, 0};
+  if (proto::find_trace(extensions_of(in))) envelope.trace_slots = kTraceHopsMax;
   static_cast<void>(uplink_.transmit(
       envelope, {view.header.sequence, proto::gimi::Operation::pong, 0, 0, view.header.epoch},
       false, view.data, 0));

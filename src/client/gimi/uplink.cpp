@@ -88,6 +88,7 @@ nif_status Uplink::transmit(const Envelope& envelope, proto::gimi::MessageHeader
   outgoing.parts = parts.data();
   outgoing.part_count = parts.size();
   outgoing.age_ms_max = envelope.age_max_ms;
+  outgoing.trace_slots = envelope.trace_slots;
   return nif_send(node(), &outgoing, timeout_ms);
 }
 

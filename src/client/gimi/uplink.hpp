@@ -33,7 +33,11 @@ struct Envelope {
   MessageKey key;
   std::uint32_t age_max_ms = 0;
   unsigned flags = 0;  ///< NIF_FLAG_*; KEYED is added
+  std::uint8_t trace_slots = 0;
 };
+
+/// Hubs of a way that a traced message tells of; as many as NIF allows.
+inline constexpr std::uint8_t kTraceHopsMax = 8;
 
 /// The way to NIF: GIMI messages in, frames out. Thread safety: any thread. The handle stays usable
 /// when it was closed; NIF then answers NIF_CLOSED.

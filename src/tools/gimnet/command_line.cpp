@@ -141,7 +141,8 @@ std::string too_many(const ToolOptions& options, const Called& called) {
   const bool acts = options.command == Command::ctl;
   const std::string& word = acts ? options.ctl.node : options.target;
   const bool names_node = acts || options.command == Command::ping ||
-                          options.command == Command::send || options.command == Command::routes;
+                          options.command == Command::send || options.command == Command::routes ||
+                          options.command == Command::trace;
   if (!names_node || !is_pattern(word)) return {};
   return "'" + word + "' is a pattern, and " + called.text() + " takes one node: `gimnet nodes '" +
          word + "'` lists those that match";

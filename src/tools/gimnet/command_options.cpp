@@ -201,8 +201,8 @@ void add_meter(CLI::App& app, const char* name, const char* about, ToolOptions& 
   add_bounds(meter, options);
 }
 
-void add_ping(CLI::App& app, ToolOptions& options) {
-  CLI::App& ping = *app.add_subcommand("ping", help::kPingAbout);
+void add_pings(CLI::App& app, const char* name, const char* about, ToolOptions& options) {
+  CLI::App& ping = *app.add_subcommand(name, about);
   ping.add_option("node", options.target, "name or id")->required()->check(not_empty());
   ping.add_option("-c,--count", options.pings, "how many, 1 to 1000000000, default 10")
       ->transform(within(std::uint64_t{1}, std::uint64_t{1'000'000'000}));
@@ -281,7 +281,8 @@ void add_commands(CLI::App& app, ToolOptions& options) {
   add_echo(app, options);
   add_meter(app, "hz", help::kHzAbout, options);
   add_meter(app, "bw", help::kBwAbout, options);
-  add_ping(app, options);
+  add_pings(app, "ping", help::kPingAbout, options);
+  add_pings(app, "trace", help::kTraceAbout, options);
   add_lists(app, options);
   add_network(app, options);
   add_impair(app, options.impair);

@@ -130,6 +130,16 @@ Examples:
   gimnet ping 7.17 -c 1000 -i 0.001 --json
 )";
 
+inline constexpr const char* kTraceAbout =
+    R"(Measure where a message spends its time: in each hub on the way back from a node, and on the links between them.
+
+Examples:
+  gimnet trace robot
+  gimnet trace 7.17 -c 100 -i 0.01 --json | jq '.hops[].delay_us'
+
+A message tells of 8 hubs at most. Clocks of hubs differ: those of their links say by how much, and how exactly.
+)";
+
 inline constexpr const char* kNodesAbout = R"(List the nodes.
 
 Examples:
@@ -200,7 +210,7 @@ Examples:
 namespace gimnet::tool {
 
 /// All commands, by the words that name them.
-inline constexpr std::array<std::pair<std::string_view, Command>, 17> kCommands{
+inline constexpr std::array<std::pair<std::string_view, Command>, 18> kCommands{
     {{"send", Command::send},
      {"recv", Command::recv},
      {"pub", Command::pub},
@@ -208,6 +218,7 @@ inline constexpr std::array<std::pair<std::string_view, Command>, 17> kCommands{
      {"hz", Command::hz},
      {"bw", Command::bw},
      {"ping", Command::ping},
+     {"trace", Command::trace},
      {"nodes", Command::nodes},
      {"services", Command::services},
      {"watch", Command::watch},

@@ -30,6 +30,8 @@ ExitCode run(const ToolOptions& options) {
       return run_bw(session);
     case Command::ping:
       return run_ping(session);
+    case Command::trace:
+      return run_trace(session);
     case Command::nodes:
       return run_nodes(session);
     case Command::services:

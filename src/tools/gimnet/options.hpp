@@ -20,6 +20,7 @@ enum class Command : std::uint8_t {
   hz,
   bw,
   ping,
+  trace,
   nodes,
   services,
   watch,

@@ -137,6 +137,7 @@ void say(const std::string& sentence);
 [[nodiscard]] ExitCode run_hz(ToolSession& session);
 [[nodiscard]] ExitCode run_bw(ToolSession& session);
 [[nodiscard]] ExitCode run_ping(ToolSession& session);
+[[nodiscard]] ExitCode run_trace(ToolSession& session);
 [[nodiscard]] ExitCode run_nodes(ToolSession& session);
 [[nodiscard]] ExitCode run_services(ToolSession& session);
 [[nodiscard]] ExitCode run_watch(ToolSession& session);

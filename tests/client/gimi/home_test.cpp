@@ -41,6 +41,7 @@ std::string wrong_call(const Node& node, const Publisher& publisher,
   if (!is_forked(node.receive({1, 2}, kForever))) return "Node::receive(key)";
   if (!is_forked(node.queue({8, 8}).receive())) return "Node::queue";
   if (!is_forked(node.ping(node.peer(), kWait))) return "ping";
+  if (!is_forked(node.trace(node.peer(), kWait))) return "trace";
   if (!is_forked(node.advertise("other"))) return "advertise";
   if (!is_forked(node.accept("another"))) return "accept";
   if (!is_forked(node.subscribe("robot/other"))) return "subscribe";

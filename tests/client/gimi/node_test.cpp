@@ -195,6 +195,11 @@ TEST_F(NodeTest, PingsAnyNode) {
   const auto round_trip = first.ping(second.peer(), kWait, Lane::real_time, "echo");
   ASSERT_TRUE(round_trip);
   EXPECT_GT(*round_trip, 0);
+  const auto traced = first.trace(second.peer(), kWait);
+  ASSERT_TRUE(traced);
+  ASSERT_EQ(traced->way_back.size(), 1u);
+  EXPECT_EQ(traced->way_back[0].hub_id, first.hub().or_throw().hub_id);
+  EXPECT_LE(traced->way_back[0].arrival_ns, traced->way_back[0].departure_ns);
   const Peer gone = second.peer();
   second.close();
   EXPECT_TRUE(first.ping(gone, kWait).is(Status::not_delivered));

@@ -17,7 +17,19 @@ TEST(PingTable, MeasuresTheRoundTrip) {
   pings.on_pong(1, kPeer);
   const auto answer = pings.wait(1, INT64_MAX, kForever);
   ASSERT_TRUE(answer);
-  EXPECT_GE(*answer, 0);
+  EXPECT_GE(answer->round_trip_ns, 0);
+  EXPECT_TRUE(answer->way_back.empty());
+}
+
+TEST(PingTable, KeepsTheWayOfAnAnswer) {
+  PingTable pings;
+  pings.expect(1, kPeer);
+  pings.on_pong(1, kPeer, {{7, 100, 140}, {8, 200, 260}});
+  const auto answer = pings.wait(1, INT64_MAX, kForever);
+  ASSERT_TRUE(answer);
+  ASSERT_EQ(answer->way_back.size(), 2u);
+  EXPECT_EQ(answer->way_back[1].hub_id, 8u);
+  EXPECT_EQ(answer->way_back[1].departure_ns, 260);
 }
 
 TEST(PingTable, TakesNoAnswerOfAnother) {
