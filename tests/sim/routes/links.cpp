@@ -19,10 +19,12 @@ hub::LinkNumber number_of(std::size_t wire) {
   return hub::LinkNumber{static_cast<std::uint32_t>(wire + 1)};
 }
 
-/// Or the mark that ends them, or (null) a keep-alive.
+/// Null: a keep-alive, for which there is none.
+std::uint16_t operation_of(const std::shared_ptr<const proto::Payload>& bytes) {
+  return bytes == nullptr ? 0 : proto::split_control(*bytes)->header.operation;
+}
 bool is_record(const std::shared_ptr<const proto::Payload>& bytes) {
-  return bytes != nullptr &&
-         proto::split_control(*bytes)->header.operation == proto::route::RecordPart::kOperation;
+  return operation_of(bytes) == proto::route::RecordPart::kOperation;
 }
 
 }  // namespace
@@ -74,6 +76,7 @@ void World::open(std::size_t wire, int end, std::uint64_t connection) {
   hub::LinkFacts facts{identity(other), each.plan.name, end == 0,
                        each.plan.costs[static_cast<std::size_t>(end)]};
   hubs_[mine.hub].state->begin_connection(number_of(wire), std::move(facts), now());
+  hubs_[mine.hub].names->begin_connection(number_of(wire), now());
   turn(mine.hub);
 }
 
@@ -82,6 +85,7 @@ void World::close(std::size_t wire, int end, bool tell) {
   End& mine = each.ends[static_cast<std::size_t>(end)];
   if (std::exchange(mine.open, false) && hubs_[mine.hub].state) {
     hubs_[mine.hub].state->end_link(number_of(wire));
+    hubs_[mine.hub].names->end_link(number_of(wire));
     after_ms(0, [this, at = mine.hub] { turn(at); });
   }
   // The far end may stand already though the first frame has not come here.
@@ -139,6 +143,7 @@ void World::pass(std::size_t wire, int to, Message message) {
     census_.note(Event::lost_record);
     return;
   }
+  count_names(target, from.connection, message, 1);
   target.last_arrival =
       std::max(target.last_arrival, now() + milliseconds(random_.between(1, plan_.delay_ms)));
   agenda_.at(target.last_arrival,
@@ -161,13 +166,16 @@ void World::arrive(std::size_t wire, int to, std::uint64_t connection, std::uint
     if (mine.open) close(wire, to, false);
     open(wire, to, connection);
   }
+  count_names(mine, connection, message, -1);
   hub::NetworkState& state = *hubs_[mine.hub].state;
   if (message.bytes == nullptr) {
     state.take_digest(number_of(wire), message.digest, now());
-  } else if (!is_record(message.bytes)) {
+  } else if (is_record(message.bytes)) {
+    take_record(wire, mine.hub, message.bytes);
+  } else if (operation_of(message.bytes) == proto::route::RecordsEnd::kOperation) {
     state.take_mark(number_of(wire));
   } else {
-    take_record(wire, mine.hub, message.bytes);
+    hubs_[mine.hub].names->take(number_of(wire), *message.bytes, now());
   }
   turn(mine.hub);
   arriving_.reset();

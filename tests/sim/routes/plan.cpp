@@ -67,7 +67,12 @@ Plan draw_plan(Random& random) {
     each.unique = random.next();
     plan.hubs.push_back(each);
   }
+  plan.changes = static_cast<std::uint32_t>(random.below(200));
+  if (random.chance(500)) plan.grace_ms = random.between(500, 5'000);
   plan.delay_ms = random.chance(300) ? random.between(50, 150) : random.between(1, 20);
+  // All copies of many names take more than the time to settle over slow links.
+  const bool many = plan.delay_ms < 50 && random.chance(100);
+  plan.names = static_cast<std::uint32_t>(many ? 300 : random.below(4));
   if (chain) {
     for (std::size_t hub = 1; hub < hubs; ++hub) add_wire(plan, random, hub - 1, hub);
     return plan;

@@ -27,9 +27,12 @@ struct WirePlan {
 struct Plan {
   std::vector<HubPlan> hubs;
   std::vector<WirePlan> wires;
-  std::uint32_t faults = 0;     ///< that come before the world is left alone
-  std::uint32_t kinds = 0;      ///< of faults, a bit set
-  std::uint64_t delay_ms = 5;   ///< the longest of a message
+  std::uint32_t faults = 0;    ///< that come before the world is left alone
+  std::uint32_t kinds = 0;     ///< of faults, a bit set
+  std::uint64_t delay_ms = 5;  ///< the longest of a message
+  std::uint32_t names = 0;     ///< of each hub alone
+  std::uint32_t changes = 0;   ///< of names that all hubs want
+  std::uint64_t grace_ms = 30'000;
   bool has_collisions = false;  ///< two hubs have one hub id, or one state folder
 };
 

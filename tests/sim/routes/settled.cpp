@@ -40,6 +40,7 @@ void Settled::check() {
   for (std::size_t hub = 0; hub < world_.hubs_.size(); ++hub) {
     check_tables(hub);
     check_ways(hub);
+    check_names(hub);
   }
 }
 

@@ -48,6 +48,8 @@ std::optional<Failure> World::run() {
   }
   for (std::uint32_t fault = 0; fault < plan_.faults; ++fault)
     after_ms(random_.below(9'000), [this] { this->fault(); });
+  for (std::uint32_t change = 0; change < plan_.changes; ++change)
+    after_ms(random_.below(9'900), [this] { change_a_name(); });
   agenda_.at(kFaultsEnd, [this] { heal(); });
   const auto run_until = [this](milliseconds end) {
     while (!failure_ && agenda_.step(end)) {
@@ -64,7 +66,7 @@ std::optional<Failure> World::run() {
   run_until(end + kQuiet);
   if (records_sent_ != 0)
     fail(Checker::quiet,
-         std::to_string(records_sent_) + " records were sent though all is settled");
+         std::to_string(records_sent_) + " records and names were sent though all is settled");
   return failure_;
 }
 
@@ -76,6 +78,7 @@ void World::start(std::size_t hub) {
   self.instance = proto::HubInstance{random_.next()};
   self.configured = each.plan.configured;
   each.state = std::make_unique<hub::NetworkState>(self, hub::HubWords{"hub", "1"});
+  start_names(hub);
   each.life = ++last_number_;
   each.away_until = now();
 }
@@ -94,6 +97,7 @@ void World::stop(std::size_t hub) {
     }
   }
   hubs_[hub].state.reset();
+  hubs_[hub].names.reset();
   hubs_[hub].life = ++last_number_;
 }
 
@@ -111,6 +115,8 @@ void World::leave(std::size_t hub, bool draw, milliseconds pause) {
   if (draw) {
     const HubId drawn = each.state->draw_hub_id(random_.next());
     each.state->renumber(drawn);
+    each.names->renumber(drawn);
+    put_names(hub);
     each.plan.hub = drawn.value();
   }
   each.life = ++last_number_;
@@ -122,6 +128,7 @@ void World::turn(std::size_t hub) {
   if (!each.state) return;
   each.state->advance(now());
   for (const hub::Sending& sending : each.state->take_sendings()) send(hub, sending);
+  turn_names(hub);
   const auto verdict = each.state->verdict();
   if (verdict == hub::Verdict::copied) {
     last_copy_ = now();
@@ -131,7 +138,9 @@ void World::turn(std::size_t hub) {
     census_.note(Event::left_for_its_id);
     leave(hub, !each.plan.configured, milliseconds(kRetryAfterVerdict + random_.below(250)));
   }
-  const auto due = each.state->next_due();
+  auto due = each.state->next_due();
+  if (const auto of_names = each.names->next_due())
+    due = std::min(due.value_or(*of_names), *of_names);
   if (!due || (each.wake && *each.wake <= *due && *each.wake > now())) return;
   const auto at = std::max(*due, now() + milliseconds(1));
   each.wake = at;

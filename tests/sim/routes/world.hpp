@@ -3,12 +3,14 @@
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "hub/network/state/name_exchange.hpp"
 #include "hub/network/state/network_state.hpp"
 #include "tests/sim/agenda.hpp"
 #include "tests/sim/random.hpp"
@@ -19,16 +21,20 @@ namespace gimnet::sim::routes {
 
 /// The checkers. Each checker has a planted bug that it must find.
 enum class Checker : std::uint8_t {
-  never_back,    ///< a record is not sent back over the link that it came from
-  joined,        ///< every link stands, or was refused for a reason that is true
-  one_id,        ///< of connected hubs no two have one hub id
-  equal_tables,  ///< connected hubs know the same hubs and have the same digest
-  shortest,      ///< every way costs what the cheapest one costs
-  arrives,       ///< frames that follow the next hops arrive, without a loop, within 31 hops
-  quiet,         ///< no records are sent any more
+  never_back,     ///< a record is not sent back over the link that it came from
+  joined,         ///< every link stands, or was refused for a reason that is true
+  one_id,         ///< of connected hubs no two have one hub id
+  equal_tables,   ///< connected hubs know the same hubs and have the same digest
+  shortest,       ///< every way costs what the cheapest one costs
+  arrives,        ///< frames that follow the next hops arrive, without a loop, within 31 hops
+  quiet,          ///< no records and names are sent any more
+  equal_names,    ///< connected hubs know the same names
+  one_owner,      ///< of connected hubs one has a name
+  names_bounded,  ///< names take a bounded room, and few are under way
 };
-inline constexpr std::array<std::string_view, 7> kCheckerNames = {
-    "never_back", "joined", "one_id", "equal_tables", "shortest", "arrives", "quiet"};
+inline constexpr std::array<std::string_view, 10> kCheckerNames = {
+    "never_back", "joined", "one_id",      "equal_tables", "shortest",
+    "arrives",    "quiet",  "equal_names", "one_owner",    "names_bounded"};
 
 struct Failure {
   Checker checker;
@@ -37,13 +43,21 @@ struct Failure {
 
 using std::chrono::milliseconds;
 
+/// A node that has a name.
+struct Node {
+  std::uint32_t index = 0;
+  proto::route::NameState state = proto::route::NameState::held;
+};
+
 /// A process, and what outlives it.
 struct Hub {
   HubPlan plan;
   std::unique_ptr<hub::NetworkState> state;  ///< null: it does not run
-  std::uint64_t life = 0;            ///< another one after a start, or when it left the network
-  milliseconds away_until{0};        ///< it left the network because of a verdict
-  std::optional<milliseconds> wake;  ///< when it has something to do
+  std::unique_ptr<hub::NameExchange> names;
+  std::map<std::string, Node> nodes;  ///< by name
+  std::uint64_t life = 0;             ///< another one after a start, or when it left the network
+  milliseconds away_until{0};         ///< it left the network because of a verdict
+  std::optional<milliseconds> wake;   ///< when it has something to do
 };
 
 /// One end of a link.
@@ -53,6 +67,8 @@ struct End {
   std::uint64_t connection = 0;  ///< the present one of this end
   milliseconds last_arrival{0};  ///< messages towards this end come in order
   bool lose_next = false;        ///< a record towards this end gets lost unseen
+  int names = 0;                 ///< NAMES under way towards this end
+  std::uint64_t names_connection = 0;
 };
 /// A link between two hubs: end 0 dials.
 struct Wire {
@@ -115,6 +131,13 @@ class World {
   void cut(std::size_t wire);
   void notice_silence(std::size_t wire);
 
+  // Names (names.cpp)
+  void start_names(std::size_t hub);
+  void put_names(std::size_t hub);
+  void change_a_name();
+  void turn_names(std::size_t hub);
+  void count_names(End& target, std::uint64_t connection, const Message& message, int more);
+
   // Faults (faults.cpp)
   void fault();
   void fault_of_a_wire(std::uint64_t kind);
@@ -161,6 +184,8 @@ class Settled {
   void check_ids();
   void check_tables(std::size_t hub);
   void check_ways(std::size_t hub);
+  /// names.cpp
+  void check_names(std::size_t hub);
   /// The hub where a frame ends up, and after how many hops. Nothing: nowhere.
   [[nodiscard]] std::optional<std::pair<std::size_t, int>> follow(std::size_t from, HubId to) const;
   void find_shortest();

@@ -38,9 +38,11 @@ class Run {
     hub_.advance(now_);
     look();
     FUZZ_MUST(!hub_.next_due() || *hub_.next_due() > now_);
-    for (std::uint32_t id = 0; const auto known = hub_.copies().node_after(NodeId{id});
-         id = known->claim->node.value())
+    NodeId last;
+    while (const auto known = hub_.copies().node_after(last)) {
       FUZZ_MUST(known->hub == kSelf);
+      last = known->claim->node;
+    }
   }
 
  private:
