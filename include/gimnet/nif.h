@@ -393,9 +393,8 @@ typedef enum nif_incoming_type {
   /** Something that a watch of this node is about [watched; text and reason: why the hub ended it,
    * if NIF_WATCH_ENDED]. */
   NIF_WATCHED = 10,
-  /** The own name is final: all hubs agreed [text: name]. Comes only after a provisional one. */
-  NIF_NAME_CONFIRMED = 11,
-  /** The own name went to a rival; the node goes on without one [text: name, from: who has it]. */
+  /** A node of another hub has the better claim to the own name; the node goes on without one. Or
+   * the text is the full name of an own service: that has ended [text: name, from: who has it]. */
   NIF_NAME_LOST = 12
 } nif_incoming_type;
 

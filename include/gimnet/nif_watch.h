@@ -15,10 +15,10 @@ extern "C" {
 
 /** Takes another name in place of the one that this node has, if any. Id and subscriptions stay.
  * Services are withdrawn and declared again under the new name by the library, each with a
- * NIF_OWN_SERVICE_MOVED. *provisional (may be NULL) is 1 if NIF_NAME_CONFIRMED or NIF_NAME_LOST is
- * still to come. NIF_TAKEN (a live node holds it; the sentence says which), NIF_BAD_NAME,
+ * NIF_OWN_SERVICE_MOVED. NIF_NAME_LOST tells should a node of another hub have the better claim to
+ * the name. NIF_TAKEN (a live node holds it; the sentence says which), NIF_BAD_NAME,
  * NIF_TIMEOUT, NIF_NOT_CONNECTED. */
-nif_status nif_register(nif_node* node, const char* name, uint8_t* provisional, int32_t timeout_ms);
+nif_status nif_register(nif_node* node, const char* name, int32_t timeout_ms);
 
 /** Gives the own name back; the node goes on without one. Its services are withdrawn, and come back
  * should it take a name again. NIF_NOT_FOUND: it has none. */

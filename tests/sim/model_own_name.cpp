@@ -26,7 +26,7 @@ void Model::judge_register(const Asked& asked) {
   }
   require_status(asked, Status::done, Checker::names);
   const auto answer = proto::decode_answer<ns::RegisterNameAnswer>(asked.answer);
-  require(answer.has_value() && answer->name == name && !answer->provisional, Checker::names,
+  require(answer.has_value() && answer->name == name, Checker::names,
           "REGISTER is answered with another name");
   census_.add(Happening::name_registered);
   renamed(asked, name, answer->token);

@@ -49,7 +49,7 @@ MAY_INCLUDE = {
         "tables", "egress", "fanout", "buffer.hpp", "budget.hpp", "ring_queue.hpp")),
     "hub/shard": _SHARD,
     "hub/crypto": _BASE + ("hub/crypto",),
-    "hub/control/state": _PROTO + ("hub/limits.hpp", "hub/crypto", "hub/control/state"),
+    "hub/control/state": _PROTO + ("hub/network/state", "hub/limits.hpp", "hub/crypto", "hub/control/state"),
     "hub/network/state": _PROTO + ("hub/limits.hpp", "hub/crypto", "hub/network/state"),
     "hub/control": _CONTROL,
     "hub/config": _CONTROL + ("hub/config",),

@@ -29,7 +29,6 @@ void check_requests(Bytes payload) {
   fuzz::check_message<ns::Subscribers>(payload);
   fuzz::check_message<ns::RegisterName>(payload);
   fuzz::check_message<ns::UnregisterName>(payload);
-  fuzz::check_message<ns::NameConfirmed>(payload);
   fuzz::check_message<ns::NameLost>(payload);
   fuzz::check_message<ns::Watch>(payload);
   fuzz::check_message<ns::Unwatch>(payload);

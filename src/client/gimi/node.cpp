@@ -188,8 +188,7 @@ Outcome<Subscription> Node::subscribe(std::string_view full_name, const QueueOpt
 
 Outcome<void> Node::take_name(std::string_view name, Timeout timeout) const {
   const std::string text(name);
-  const nif_status status =
-      nif_register(core().node(), text.c_str(), nullptr, nif_timeout(timeout));
+  const nif_status status = nif_register(core().node(), text.c_str(), nif_timeout(timeout));
   if (status != NIF_OK) return failure_of(status, "take the name '" + text + "'");
   core().on_renamed();
   return {};

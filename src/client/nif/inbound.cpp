@@ -312,9 +312,8 @@ Inbound::Verdict Inbound::take_event(const proto::ControlView& event,
     }
     case proto::ns::Operation::watch_events:
       return take_watch_events(payload);
-    case proto::ns::Operation::name_confirmed:
     case proto::ns::Operation::name_lost:
-      return take_name_event(static_cast<proto::ns::Operation>(event.header.operation), payload);
+      return take_name_lost(payload);
     default:
       ++counts_.ignored;
       return Verdict::going;
@@ -332,23 +331,13 @@ Inbound::Verdict Inbound::take_watch_events(std::span<const std::byte> payload) 
   return Verdict::going;
 }
 
-Inbound::Verdict Inbound::take_name_event(proto::ns::Operation operation,
-                                          std::span<const std::byte> payload) {
-  const bool lost = operation == proto::ns::Operation::name_lost;
-  proto::ns::NameLost event;
-  if (lost) {
-    auto read = proto::decode<proto::ns::NameLost>(payload);
-    if (!read) return malformed(read.error().sentence);
-    event = std::move(*read);
-  } else {
-    auto read = proto::decode<proto::ns::NameConfirmed>(payload);
-    if (!read) return malformed(read.error().sentence);
-    event.name = std::move(read->name);
-  }
-  host_.on_name_decided(event.name, lost);
-  Record* record = make_event(lost ? NIF_NAME_LOST : NIF_NAME_CONFIRMED, event.name);
-  record->incoming.from = event.holder.value();
-  add_record(record, event.name.size());
+Inbound::Verdict Inbound::take_name_lost(std::span<const std::byte> payload) {
+  const auto event = proto::decode<proto::ns::NameLost>(payload);
+  if (!event) return malformed(event.error().sentence);
+  host_.on_name_lost(event->name);
+  Record* record = make_event(NIF_NAME_LOST, event->name);
+  record->incoming.from = event->holder.value();
+  add_record(record, event->name.size());
   return Verdict::going;
 }
 

@@ -36,8 +36,8 @@ class InboundHost {
   [[nodiscard]] virtual bool on_service_moved(const proto::ns::ServiceMoved& event) = 0;
   /// True: the program is to have it.
   [[nodiscard]] virtual bool on_watch_events(const proto::ns::WatchEvents& events) = 0;
-  /// The own name is final, or (`lost`) a rival's.
-  virtual void on_name_decided(const std::string& name, bool lost) = 0;
+  /// A node of another hub has the own name, or the full name of an own service.
+  virtual void on_name_lost(const std::string& name) = 0;
   virtual void on_taken(std::uint32_t from, const proto::Taken& taken) = 0;
   /// True: the program did not ask for this report.
   virtual bool on_report(const proto::Report& report) = 0;
@@ -125,8 +125,7 @@ class Inbound {
   [[nodiscard]] Verdict take_event(const proto::ControlView& event,
                                    std::span<const std::byte> payload);
   [[nodiscard]] Verdict take_watch_events(std::span<const std::byte> payload);
-  [[nodiscard]] Verdict take_name_event(proto::ns::Operation operation,
-                                        std::span<const std::byte> payload);
+  [[nodiscard]] Verdict take_name_lost(std::span<const std::byte> payload);
   [[nodiscard]] Verdict take_report(const proto::FrameView& view);
   void add_frame(const proto::FrameView& view, const std::byte* frame);
   void add_record(Record* record, std::size_t bytes);

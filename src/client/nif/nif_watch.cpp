@@ -20,8 +20,7 @@ using gimnet::nif::with_waiting_node;
 
 extern "C" {
 
-nif_status nif_register(nif_node* node, const char* name, uint8_t* provisional,
-                        int32_t timeout_ms) {
+nif_status nif_register(nif_node* node, const char* name, int32_t timeout_ms) {
   return with_waiting_node(node, [&](Node& found) -> nif_status {
     if (const nif_status status = check_name(name, "take the name", gimnet::proto::node_name_fault);
         status != NIF_OK)
@@ -31,7 +30,6 @@ nif_status nif_register(nif_node* node, const char* name, uint8_t* provisional,
     const nif_status status = ask(found, ns::RegisterName{name}, answer, "take the name", name,
                                   deadline_after(timeout_ms));
     if (status != NIF_OK) return status;
-    if (provisional != nullptr) *provisional = answer.provisional ? 1 : 0;
     found.set_name(answer.name, std::move(answer.token));
     return NIF_OK;
   });

@@ -211,11 +211,13 @@ bool Node::on_watch_events(const proto::ns::WatchEvents& events) {
   return watches_.on_events(events);
 }
 
-void Node::on_name_decided(const std::string& name, bool lost) {
-  if (!lost) return;
+void Node::on_name_lost(const std::string& name) {
   take_new_name();  // with its token
   {
     const MutexLock lock(mutex_);
+    // The full name of an own service begins with the own name.
+    const std::string own{info_.name};
+    if (!own.empty() && name.starts_with(own + '/')) return;
     lost_name_ = name;
   }
   set_name("", session_.token);

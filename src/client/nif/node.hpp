@@ -83,7 +83,7 @@ class Node final : private InboundHost {
                                             const proto::ControlView& answer) override;
   bool on_service_moved(const proto::ns::ServiceMoved& event) override;
   [[nodiscard]] bool on_watch_events(const proto::ns::WatchEvents& events) override;
-  void on_name_decided(const std::string& name, bool lost) override;
+  void on_name_lost(const std::string& name) override;
   void on_taken(std::uint32_t from, const proto::Taken& taken) override;
   bool on_report(const proto::Report& report) override;
   [[nodiscard]] std::optional<ReportedMessages::Start> message_of(

@@ -71,14 +71,16 @@ Conductor::Conductor(HubFacts facts, Placement placement, Limits& limits, Wiring
       watches_(HubTitle{facts_.id, facts_.name}, epoch_of(wiring_.start), limits),
       publisher_(facts_.id, facts_.shards, wiring_.tables),
       keeper_(wiring_.start.state, wiring_.keep_state),
-      runner_({facts_, wiring_.shards, membership_, watches_, publisher_, keeper_}),
+      names_({facts_, limits_, membership_, watches_}),
+      runner_({facts_, wiring_.shards, membership_, watches_, publisher_, keeper_, &names_}),
       returns_published_(membership_.sessions().returns_until().has_value()) {
   GIMNET_CHECK(wiring_.shards.shards() == facts_.shards);
   if (wiring_.network) {
     links_ = std::make_unique<Links>(
         wiring_.network->options,
         Links::Wiring{facts_, limits_, wiring_.shards, membership_.sessions().slots(),
-                      wiring_.network->routes, wiring_.network->dial, wiring_.network->random});
+                      wiring_.network->routes, names_, wiring_.network->dial,
+                      wiring_.network->random});
     overview_ = std::make_unique<NetworkOverview>(
         NetworkOverview::Parts{facts_, *links_, wiring_.sessions});
     remote_requests_ =
@@ -161,7 +163,6 @@ proto::Welcome Conductor::welcome(const Session& session, const proto::Hello& he
   welcome.grace_ms = static_cast<std::uint32_t>(limits_.grace_ms);
   welcome.name = session.name.str();
   welcome.retained_bytes_max = static_cast<std::uint32_t>(limits_.retained_most());
-  welcome.name_provisional = membership_.directory().is_provisional(session.name);
   if (session.closing) {
     welcome.last_goodbye_code = static_cast<std::uint16_t>(session.closing->code);
     welcome.last_goodbye_sentence = session.closing->sentence.substr(0, proto::kSentenceBytesMax);
@@ -210,9 +211,10 @@ void Conductor::on_frame(const ControlFrameEvent& event, milliseconds now) {
   }
   Effects effects;
   HandlerContext context = context_for(effects, now);
-  const Request request{*session, view->header, payload};
   const NodeId dst{header.dst};
-  const bool is_ours = dst == NodeId{} || dst == make_id<NodeId>(facts_.id, kHubIndex);
+  const bool names_us = dst == make_id<NodeId>(facts_.id, kHubIndex);
+  const bool is_ours = dst == NodeId{} || names_us;
+  const Request request{*session, view->header, payload, names_us};
   const ShardIndex shard = session->place.shard;
   std::optional<proto::Refusal> refusal;
   if (!is_ours && remote_requests_ != nullptr) {
@@ -242,16 +244,18 @@ HandlerContext Conductor::context_for(Effects& effects, milliseconds now) {
                          this};
   if (links_ != nullptr) {
     context.network = overview_.get();
-    context.names = &links_->names();
   }
+  context.names = &names_;
   return context;
 }
 
 void Conductor::on_link_frame(const ControlFrameEvent& event, milliseconds now) {
   const proto::Kind kind = proto::load_header(event.frame.data()).kind;
   const std::span<const std::byte> payload = std::span{event.frame}.subspan(proto::kHeaderSize);
-  if (kind == proto::Kind::route)
-    return links_->on_route(event.session, event.attachment, payload, moment(now));
+  if (kind == proto::Kind::route) {
+    links_->on_route(event.session, event.attachment, payload, moment(now));
+    return settle_names(now);
+  }
   if (!remote_requests_->take(event, now)) return;
   const auto view = proto::split_control(payload);
   if (!view) return;
@@ -261,7 +265,7 @@ void Conductor::on_link_frame(const ControlFrameEvent& event, milliseconds now) 
   const Handler handle = may_be_asked_from_afar(kind, view->header.operation)
                              ? handler_for(proto::Role::node, kind, view->header.operation)
                              : handle_denied_from_afar;
-  remote_requests_->answer(event, handle(context, {kAfar, view->header, payload}));
+  remote_requests_->answer(event, handle(context, {kAfar, view->header, payload, true}));
 }
 
 void Conductor::on_oddity(const ControlFrameEvent& event, milliseconds now) {
@@ -305,6 +309,7 @@ void Conductor::close(const Session& session, GoodbyeCode code, std::string sent
 void Conductor::tick(milliseconds now) {
   if (links_ != nullptr) {
     links_->tick(moment(now));
+    settle_names(now);
     remote_requests_->tick(now);
   }
   Effects effects;

@@ -12,6 +12,7 @@
 #include "hub/control/handle/request.hpp"
 #include "hub/control/hub_facts.hpp"
 #include "hub/control/links.hpp"
+#include "hub/control/network_names.hpp"
 #include "hub/control/network_overview.hpp"
 #include "hub/control/remote_requests.hpp"
 #include "hub/control/shard_proxy.hpp"
@@ -115,6 +116,12 @@ class Conductor final : private Administration {
                                        Moment moment) const;
   void on_frame(const ControlFrameEvent& event, std::chrono::milliseconds now);
   void on_link_frame(const ControlFrameEvent& event, std::chrono::milliseconds now);
+  /// Carries out what follows from names of other hubs.
+  void settle_names(std::chrono::milliseconds now) {
+    Effects effects;
+    names_.settle(now, effects);
+    runner_.carry_out(effects, now);
+  }
   [[nodiscard]] HandlerContext context_for(Effects& effects, std::chrono::milliseconds now);
   [[nodiscard]] Links::Moment moment(std::chrono::milliseconds now) const {
     return {now, wiring_.network ? wiring_.network->wall_now_ns() : 0};
@@ -144,6 +151,7 @@ class Conductor final : private Administration {
   TablePublisher publisher_;
   RequestCounters request_counters_;
   StateKeeper keeper_;
+  NetworkNames names_;
   EffectRunner runner_;                              ///< on all of these
   std::unique_ptr<Links> links_;                     ///< nullptr: a hub alone
   std::unique_ptr<NetworkOverview> overview_;        ///< with links_

@@ -32,6 +32,7 @@ void EffectRunner::carry_out(const Effects& effects, milliseconds now) {
           if constexpr (std::is_same_v<One, NodeNoted> || std::is_same_v<One, ServiceNoted>) {
             log_change(one, parts_.membership, parts_.facts.id);
             parts_.watches.note(one, parts_.membership, now);
+            if (parts_.names != nullptr) parts_.names->note(one);
           } else {
             run(one);
           }
@@ -121,8 +122,8 @@ void EffectRunner::tell_again(Session& session, AttachCommand& command) const {
 proto::Payload EffectRunner::payload_of(const Topic& topic, std::uint32_t window) const {
   ns::ServiceMoved event;
   event.name = std::string{topic.full_name};
-  const HubTitle title{parts_.facts.id, parts_.facts.name};
-  put_state(event, title, topic, parts_.membership);
+  const NameCopies* names = parts_.names == nullptr ? nullptr : parts_.names->copies();
+  put_state(event, HubTitle{parts_.facts.id, parts_.facts.name}, topic, parts_.membership, names);
   event.window = window;
   return proto::encode(event);
 }
@@ -160,12 +161,10 @@ void EffectRunner::run(const SubscribersChanged& effect) {
   send_event(*session, proto::encode(ns::Subscribers{group_id(topic->service->group), number}));
 }
 
-void EffectRunner::run(const NameDecided& effect) {
+void EffectRunner::run(const NameLost& effect) {
   const Session* session = find(effect.node);
   if (session == nullptr) return;
-  send_event(*session, effect.confirmed ? proto::encode(ns::NameConfirmed{effect.name})
-                                        : proto::encode(ns::NameLost{effect.name, effect.holder,
-                                                                     effect.sentence}));
+  send_event(*session, proto::encode(ns::NameLost{effect.name, effect.holder, effect.sentence}));
 }
 
 void EffectRunner::send_event(const Session& session, const proto::Payload& payload) {

@@ -3,6 +3,7 @@
 #include <chrono>
 
 #include "hub/control/hub_facts.hpp"
+#include "hub/control/network_names.hpp"
 #include "hub/control/shard_proxy.hpp"
 #include "hub/control/state/effects.hpp"
 #include "hub/control/state/membership.hpp"
@@ -26,6 +27,7 @@ class EffectRunner {
     Watches& watches;
     TablePublisher& publisher;
     StateKeeper& keeper;
+    NetworkNames* names = nullptr;  ///< or none: a hub alone
   };
   explicit EffectRunner(const Parts& parts) : parts_(parts) {}
 
@@ -50,7 +52,7 @@ class EffectRunner {
   void run(const SubscribersChanged& effect);
   void run(const CloseDue& effect);
   void run(const StateDue& effect);
-  void run(const NameDecided& effect);
+  void run(const NameLost& effect);
   [[nodiscard]] const Session* find(NodeIndex node) const {
     return parts_.membership.sessions().find(node);
   }

@@ -36,7 +36,6 @@ Links::Links(LinksOptions options, const Wiring& wiring)
                 wiring.facts.instance,
                 wiring.facts.id_configured},
                {wiring.facts.name, wiring.facts.version}),
-      names_({{wiring.facts.id, wiring.facts.instance}, milliseconds{wiring.limits.grace_ms}}),
       handshake_({wiring.facts, wiring.limits, options_, network_}) {
   for (const DialledLink& link : options_.dial) static_cast<void>(add(link));
 }
@@ -175,7 +174,7 @@ void Links::begin_exchange(HubLink& link, Moment moment) {
   network_.begin_connection(
       link.number(), {link.identity(), link.name(), link.is_dialled(), link.cost()}, moment.now);
   network_.set_damped(link.number(), link.damped_until().has_value());
-  names_.begin_connection(link.number(), moment.now);
+  wiring_.names.begin_connection(link.number(), moment.now);
 }
 
 void Links::on_route(const SessionRef& session, std::uint32_t attachment,
@@ -203,7 +202,7 @@ void Links::on_route(const SessionRef& session, std::uint32_t attachment,
     case proto::route::Operation::names_known:
     case proto::route::Operation::names:
     case proto::route::Operation::names_taken:
-      names_.take(link->number(), payload, moment.now);
+      wiring_.names.take(link->number(), payload, moment.now);
       break;
   }
   advance(moment);
@@ -236,7 +235,7 @@ void Links::withdraw(HubLink& link) {
   link.give_up();
   link.epoch = 0;
   network_.end_link(link.number());
-  names_.end_link(link.number());
+  wiring_.names.end_link(link.number());
   if (!link.place) return;
   const Place place = *std::exchange(link.place, std::nullopt);
   by_generation_.erase(place.generation);
@@ -276,7 +275,7 @@ std::optional<milliseconds> Links::next_deadline() const {
   const auto note = [&due](std::optional<milliseconds> time) {
     if (time && (!due || *time < *due)) due = time;
   };
-  note(names_.next_due());
+  note(wiring_.names.next_due());
   for (const auto& [number, link] : links_) {
     note(link->resume_until());
     note(link->damped_until());
@@ -292,10 +291,9 @@ void Links::advance(Moment moment) {
   publish_routes();
   if (map_seen_ != network_.maps()) {
     map_seen_ = network_.maps();
-    names_.set_reachable(network_.map(), network_.store(), moment.now);
+    wiring_.names.set_reachable(network_.map(), network_.store(), moment.now);
   }
-  names_.advance(moment.now);
-  send_all(names_.take_sendings());
+  send_all(wiring_.names.take_sendings(moment.now));
   if (const Verdict verdict = network_.verdict(); verdict != Verdict::stay)
     leave_network(verdict, moment);
 }

@@ -16,11 +16,11 @@
 #include "hub/control/hub_facts.hpp"
 #include "hub/control/hub_link.hpp"
 #include "hub/control/link_handshake.hpp"
+#include "hub/control/network_names.hpp"
 #include "hub/control/next_hops.hpp"
 #include "hub/control/shard_proxy.hpp"
 #include "hub/control/state/slot_pool.hpp"
 #include "hub/limits.hpp"
-#include "hub/network/state/name_exchange.hpp"
 #include "hub/network/state/network_state.hpp"
 #include "net/dial.hpp"
 
@@ -42,6 +42,7 @@ class Links {
     ShardProxy& shards;
     SlotPool& slots;
     RouteTable& routes;
+    NetworkNames& names;
     Dial dial;
     std::function<std::uint64_t()> random;  ///< 64 bits that nobody can guess
   };
@@ -68,8 +69,6 @@ class Links {
 
   [[nodiscard]] NextHops& next_hops() { return next_hops_; }
   [[nodiscard]] const NetworkState& network() const { return network_; }
-  /// The names of all hubs. Changes of own names are sent with the next advance(), at once.
-  [[nodiscard]] NameExchange& names() { return names_; }
   /// Says what is due, and publishes what follows from it.
   void advance(Moment moment);
 
@@ -103,7 +102,6 @@ class Links {
   const Wiring wiring_;
   NextHops next_hops_;
   NetworkState network_;
-  NameExchange names_;
   const LinkHandshake handshake_;  ///< of these
   std::uint64_t map_seen_ = 0;     ///< the map that the names were told of
   std::map<LinkNumber, std::unique_ptr<HubLink>> links_;

@@ -34,6 +34,7 @@ Payload encode_refusal(ControlHeader request, const Refusal& refusal) {
   bitestream::Writer body;
   body.put_u16(kStatusKey, static_cast<std::uint16_t>(refusal.status));
   put_clean_text(body, kSentenceKey, refusal.sentence, kSentenceBytesMax);
+  if (refusal.learning) body.put_bool(kLearningKey, true);
   return assemble_control(
       {static_cast<std::uint16_t>(request.operation | kAnswerBit), request.request}, body);
 }
@@ -43,7 +44,11 @@ Refusal read_status(std::span<const std::byte> body) {
   const auto status = fields.required_number<std::uint16_t>(kStatusKey, "status");
   std::string sentence = fields.text(kSentenceKey, "sentence", kSentenceBytesMax);
   if (fields.failed()) return {Status::bad_request, fields.error().sentence};
-  return {static_cast<Status>(status), std::move(sentence)};
+  Refusal refusal{static_cast<Status>(status), std::move(sentence)};
+  // An answer that is none has other values under that key.
+  if (refusal.status != Status::done)
+    refusal.learning = fields.flag(kLearningKey, "learning", false);
+  return refusal;
 }
 
 Status peek_status(std::span<const std::byte> payload) {

@@ -71,7 +71,8 @@ using Payload = std::vector<std::byte>;
 /// An answer that says no.
 struct Refusal {
   Status status = Status::bad_request;
-  std::string sentence;  ///< what happened, to what, and what to do
+  std::string sentence;   ///< what happened, to what, and what to do
+  bool learning = false;  ///< of RESOLVE: names of other hubs may be on their way
 };
 [[nodiscard]] Payload encode_refusal(ControlHeader request, const Refusal& refusal);
 

@@ -17,6 +17,7 @@ namespace gimnet::proto {
 
 inline constexpr std::uint32_t kStatusKey = 1;
 inline constexpr std::uint32_t kSentenceKey = 2;
+inline constexpr std::uint32_t kLearningKey = 5;
 
 inline constexpr std::size_t kSentenceBytesMax = 1024;
 /// What is written of a name or pattern: more than any may have, so that one that is too long is

@@ -43,8 +43,7 @@ enum : std::uint32_t {
   taken,
   resume_buffer_bytes,
   grace_ms,
-  name_provisional,
-  last_goodbye_code,
+  last_goodbye_code = 16,
   last_goodbye_sentence,
   name,
   retained_bytes_max,
@@ -182,7 +181,6 @@ void Welcome::write(bitestream::Writer& writer) const {
   writer.put_u64(key::taken, taken);
   writer.put_u32(key::resume_buffer_bytes, resume_buffer_bytes);
   writer.put_u32(key::grace_ms, grace_ms);
-  writer.put_bool(key::name_provisional, name_provisional);
   if (last_goodbye_code != 0) writer.put_u16(key::last_goodbye_code, last_goodbye_code);
   put_clean_text(writer, key::last_goodbye_sentence, last_goodbye_sentence, kSentenceBytesMax);
   put_clean_text(writer, key::name, name, kNameBytesMax);
@@ -210,7 +208,6 @@ Welcome Welcome::read(Fields& fields) {
   welcome.resume_buffer_bytes =
       fields.number<std::uint32_t>(key::resume_buffer_bytes, "resume buffer", 0);
   welcome.grace_ms = fields.number<std::uint32_t>(key::grace_ms, "grace time", 0);
-  welcome.name_provisional = fields.flag(key::name_provisional, "provisional name", false);
   welcome.last_goodbye_code =
       fields.number<std::uint16_t>(key::last_goodbye_code, "last GOODBYE", 0);
   welcome.last_goodbye_sentence =

@@ -109,7 +109,6 @@ struct Welcome {
   std::uint64_t taken = 0;       ///< data frames of this epoch that the hub took from this node
   std::uint32_t resume_buffer_bytes = 0;  ///< 0: no resume on this connection
   std::uint32_t grace_ms = 0;
-  bool name_provisional = false;
   std::uint16_t last_goodbye_code =
       0;  ///< with which the hub closed the session's last connection; 0: it did not
   std::string last_goodbye_sentence;

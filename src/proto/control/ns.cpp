@@ -92,9 +92,17 @@ void Resolve::write(bitestream::Writer& writer) const {
 }
 Resolve Resolve::read(Fields& fields) { return {read_name(fields, 3, "name")}; }
 
-void ResolveAnswer::write(bitestream::Writer& writer) const { writer.put_u32(3, node.value()); }
+void ResolveAnswer::write(bitestream::Writer& writer) const {
+  writer.put_u32(3, node.value());
+  if (standing != NameStanding::held) put_choice(writer, 4, standing);
+  if (learning) writer.put_bool(kLearningKey, true);
+}
 ResolveAnswer ResolveAnswer::read(Fields& fields) {
-  return {read_required_id<NodeId>(fields, 3, "node id")};
+  ResolveAnswer answer;
+  answer.node = read_required_id<NodeId>(fields, 3, "node id");
+  answer.standing = read_choice<NameStanding>(fields, 4, "standing of a name");
+  answer.learning = fields.flag(kLearningKey, "learning", false);
+  return answer;
 }
 
 void Reverse::write(bitestream::Writer& writer) const { writer.put_u32(3, node.value()); }

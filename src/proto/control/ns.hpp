@@ -31,7 +31,6 @@ enum class Operation : std::uint16_t {
   watch_taken = 13,
   service_moved = 32,
   subscribers = 33,
-  name_confirmed = 35,
   name_lost = 36,
   watch_events = 37,
 };
@@ -66,10 +65,19 @@ struct Resolve {
   friend bool operator==(const Resolve&, const Resolve&) = default;
 };
 
+/// A name as those see it that ask for it.
+enum class NameStanding : std::uint8_t {
+  held = 0,
+  away = 1,         ///< its node has lost its connection: a newcomer may take the name
+  unreachable = 2,  ///< its hub cannot be reached, or has restarted: nobody may take it for a while
+};
+
 struct ResolveAnswer {
   static constexpr std::uint16_t kOperation = answer_of(Operation::resolve);
   static constexpr const char* kName = "answer to RESOLVE";
   NodeId node;
+  NameStanding standing = NameStanding::held;  ///< as sent: may be a value that is not listed
+  bool learning = false;                       ///< names of other hubs may be on their way
   void write(bitestream::Writer& writer) const;
   [[nodiscard]] static ResolveAnswer read(Fields& fields);
   friend bool operator==(const ResolveAnswer&, const ResolveAnswer&) = default;

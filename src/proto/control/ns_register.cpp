@@ -13,13 +13,11 @@ RegisterName RegisterName::read(Fields& fields) {
 
 void RegisterNameAnswer::write(bitestream::Writer& writer) const {
   put_clean_text(writer, 3, name, kNameBytesMax);
-  writer.put_bool(4, provisional);
   writer.put_opaque(5, token);
 }
 RegisterNameAnswer RegisterNameAnswer::read(Fields& fields) {
   RegisterNameAnswer answer;
   answer.name = fields.required_text(3, "name", kNameBytesMax);
-  answer.provisional = fields.flag(4, "provisional", false);
   answer.token = fields.opaque(5, "token", kTokenBytesMax);
   return answer;
 }
@@ -27,13 +25,6 @@ RegisterNameAnswer RegisterNameAnswer::read(Fields& fields) {
 void UnregisterNameAnswer::write(bitestream::Writer& writer) const { writer.put_opaque(5, token); }
 UnregisterNameAnswer UnregisterNameAnswer::read(Fields& fields) {
   return {fields.opaque(5, "token", kTokenBytesMax)};
-}
-
-void NameConfirmed::write(bitestream::Writer& writer) const {
-  put_clean_text(writer, 3, name, kNameBytesMax);
-}
-NameConfirmed NameConfirmed::read(Fields& fields) {
-  return {fields.required_text(3, "name", kNameBytesMax)};
 }
 
 void NameLost::write(bitestream::Writer& writer) const {

@@ -25,7 +25,6 @@ struct RegisterNameAnswer {
   static constexpr std::uint16_t kOperation = answer_of(Operation::register_name);
   static constexpr const char* kName = "answer to REGISTER";
   std::string name;              ///< as registered
-  bool provisional = false;      ///< NAME_CONFIRMED or NAME_LOST will tell
   std::vector<std::byte> token;  ///< of the session, in place of the one of WELCOME
   void write(bitestream::Writer& writer) const;
   [[nodiscard]] static RegisterNameAnswer read(Fields& fields);
@@ -53,17 +52,8 @@ struct UnregisterNameAnswer {
 
 // Events
 
-/// A provisional name is final now.
-struct NameConfirmed {
-  static constexpr std::uint16_t kOperation = request_of(Operation::name_confirmed);
-  static constexpr const char* kName = "NAME_CONFIRMED";
-  std::string name;
-  void write(bitestream::Writer& writer) const;
-  [[nodiscard]] static NameConfirmed read(Fields& fields);
-  friend bool operator==(const NameConfirmed&, const NameConfirmed&) = default;
-};
-
-/// The name went to a rival; the node goes on without one.
+/// The name went to a node of another hub, which has the better claim: the node goes on without
+/// one. Or it is the full name of a service of this node: that has ended.
 struct NameLost {
   static constexpr std::uint16_t kOperation = request_of(Operation::name_lost);
   static constexpr const char* kName = "NAME_LOST";

@@ -205,9 +205,8 @@ TEST_F(KeptEpochs, OutliveBreaksRestartsOfTheHubOtherIdsAndNames) {
   std::thread renaming([&] { node_->take_name("forklift").or_throw(); });
   std::uint16_t number = 0;
   EXPECT_TRUE(hub_.next_request<proto::ns::RegisterName>(number));
-  hub_.send_control(
-      proto::Kind::ns,
-      proto::encode_answer(proto::ns::RegisterNameAnswer{"forklift", false, {}}, number));
+  hub_.send_control(proto::Kind::ns,
+                    proto::encode_answer(proto::ns::RegisterNameAnswer{"forklift", {}}, number));
   answer_advertise();
   renaming.join();
   expect_epochs("another name");

@@ -34,21 +34,19 @@ TEST(NifWatch, ChecksWhatItIsGivenBeforeItAsks) {
   EXPECT_EQ(nif_watch(node, nullptr, NIF_WATCH_ALL, nullptr, 0), NIF_BAD_ARGUMENT);
   EXPECT_EQ(nif_watch_again(node, 5, 0), NIF_NOT_FOUND);
   EXPECT_EQ(nif_unwatch(node, 5, 0), NIF_NOT_FOUND);
-  EXPECT_EQ(nif_register(node, "a b", nullptr, 0), NIF_BAD_NAME);
-  EXPECT_EQ(nif_register(node, nullptr, nullptr, 0), NIF_BAD_ARGUMENT);
+  EXPECT_EQ(nif_register(node, "a b", 0), NIF_BAD_NAME);
+  EXPECT_EQ(nif_register(node, nullptr, 0), NIF_BAD_ARGUMENT);
   EXPECT_EQ(nif_watch(nullptr, nullptr, NIF_WATCH_ALL, &watch, 0), NIF_CLOSED);
 }
 
-TEST(NifWatch, TakesANameAndSaysWhetherItIsProvisional) {
+TEST(NifWatch, TakesANameAndLosesItToANodeOfAnotherHub) {
   FakeHub hub;
   Connected connected = connect_to(hub, default_options(), make_welcome());
   nif_node* const node = connected.node.get();
   std::atomic<bool> has_name{false};
   converse(
       [node, &has_name] {
-        std::uint8_t provisional = 0;
-        EXPECT_EQ(nif_register(node, "forklift", &provisional, NIF_FOREVER), NIF_OK);
-        EXPECT_EQ(provisional, 1);
+        EXPECT_EQ(nif_register(node, "forklift", NIF_FOREVER), NIF_OK);
         nif_info info{};
         info.struct_size = sizeof info;
         EXPECT_EQ(nif_get_info(node, &info), NIF_OK);
@@ -70,7 +68,7 @@ TEST(NifWatch, TakesANameAndSaysWhetherItIsProvisional) {
         EXPECT_EQ(request->name, "forklift");
         connected.hub.send_control(
             proto::Kind::ns,
-            proto::encode_answer(ns::RegisterNameAnswer{"forklift", true, {std::byte{1}}}, number));
+            proto::encode_answer(ns::RegisterNameAnswer{"forklift", {std::byte{1}}}, number));
         while (!has_name) std::this_thread::yield();
         connected.hub.send_control(
             proto::Kind::ns, proto::encode(ns::NameLost{"forklift", NodeId{kPeerId}, "late"}));

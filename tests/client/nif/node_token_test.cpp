@@ -122,12 +122,11 @@ TEST(NodeToken, AReplacedNodeLetsItGoAndStaysAway) {
 /// Has the node ask for a name, and gives it.
 void rename(Connected& connected, const char* name, const std::vector<std::byte>& token) {
   std::thread asking(
-      [&] { EXPECT_EQ(nif_register(connected.node.get(), name, nullptr, NIF_FOREVER), NIF_OK); });
+      [&] { EXPECT_EQ(nif_register(connected.node.get(), name, NIF_FOREVER), NIF_OK); });
   std::uint16_t number = 0;
   EXPECT_TRUE(connected.hub.next_request<proto::ns::RegisterName>(number));
   connected.hub.send_control(
-      proto::Kind::ns,
-      proto::encode_answer(proto::ns::RegisterNameAnswer{name, false, token}, number));
+      proto::Kind::ns, proto::encode_answer(proto::ns::RegisterNameAnswer{name, token}, number));
   asking.join();
   while (info_of(connected.node.get()).token_kept == 0) std::this_thread::yield();
 }

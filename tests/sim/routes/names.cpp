@@ -29,7 +29,7 @@ route::NameClaim claim_of(HubId hub, std::uint32_t node, route::NameState state)
 std::map<std::pair<std::string, HubId>, route::NameClaim> names_at(const hub::NameCopies& copies) {
   std::map<std::pair<std::string, HubId>, route::NameClaim> names;
   const auto add = [&names](const hub::KnownName& known) {
-    if (known.standing != hub::Standing::unreachable)
+    if (known.standing != proto::ns::NameStanding::unreachable)
       names[{std::string{known.name}, known.hub}] = *known.claim;
   };
   NodeId node;
@@ -76,8 +76,10 @@ void World::change_a_name() {
   const auto mine = each.nodes.find(name);
   if (mine == each.nodes.end()) {
     const auto known = each.names->copies().find(name);
-    if (known && known->standing == hub::Standing::held) return census_.note(Event::refused_name);
-    if (known && known->standing == hub::Standing::unreachable && random_.chance(500)) return;
+    if (known && known->standing == proto::ns::NameStanding::held)
+      return census_.note(Event::refused_name);
+    if (known && known->standing == proto::ns::NameStanding::unreachable && random_.chance(500))
+      return;
     if (known) census_.note(Event::took_over);
     each.nodes[name] = {index, route::NameState::held};
   } else if (random_.chance(500)) {

@@ -28,11 +28,12 @@ OPERATIONS = {
 FLOWS = ("", "PING", "PONG", "CREDIT", "PAUSE", "RESUME", "CONFIRM", "SKIP", "DROPPED")
 
 # What is another one each time: (kind, operation): paths of keys. Sentences are for people, and may be put in other words.
+# Keys 15 of WELCOME and 4 of REGISTER's answer said that a name is not provisional: no name is any more.
 VOLATILE = {
     (LINK, HELLO): {(3,), (4,)},
-    (LINK, WELCOME): {(2,), (5,), (10,), (17,)},
+    (LINK, WELCOME): {(2,), (5,), (10,), (15,), (17,)},
     (LINK, GOODBYE): {(2,)},
-    (NS, 0x8001): {(5,)},
+    (NS, 0x8001): {(4,), (5,)},
     (NS, 0x8002): {(5,)},
     (NS, 0x8005): {(3, 7), (3, 8)},
     (NS, 0x8007): {(5,)},

@@ -1,6 +1,7 @@
 #include "hub/control/handle/names.hpp"
 
 #include "base/log.hpp"
+#include "hub/control/handle/network_page.hpp"
 #include "hub/control/state/listing.hpp"
 #include "hub/control/state/records.hpp"
 #include "proto/control/ns_register.hpp"
@@ -11,7 +12,8 @@ namespace {
 using proto::Status;
 namespace ns = proto::ns;
 
-Result<ns::ListAnswer, proto::Refusal> list(const HandlerContext& context, const ns::List& wanted) {
+Result<ns::ListAnswer, proto::Refusal> list(const HandlerContext& context, const Request& request,
+                                            const ns::List& wanted) {
   const auto pattern = proto::Pattern::parse(wanted.pattern);
   if (!wanted.pattern.empty() && !pattern) {
     return proto::Refusal{Status::bad_request,
@@ -19,26 +21,67 @@ Result<ns::ListAnswer, proto::Refusal> list(const HandlerContext& context, const
                               "' is no pattern: write a name of at most 16 parts and 255 bytes in "
                               "which a part may be * or **"};
   }
-  const Listed<NodeIndex> listed =
-      list_nodes(context.membership,
-                 {pattern ? &*pattern : nullptr, node_index_of(wanted.after), wanted.connected_only,
-                  context.limits.page_records, context.limits.scan_records});
-  ns::ListAnswer answer;
-  answer.more = listed.more;
-  answer.next = listed.more ? make_id(context.facts.id, listed.next) : NodeId{};
-  PageBudget budget(context.limits, wanted.records_max);
+  NetworkPage<NodeId, ns::NodeRecord> page(context, wanted.after, wanted.records_max);
   const HubTitle title{context.facts.id, context.facts.name};
-  for (const NodeIndex index : listed.indices) {
-    const Session& session = *context.membership.sessions().find(index);
-    ns::NodeRecord record = record_of(title, session, context.membership.services(), context.now);
-    if (!budget.take(ns::page_bytes_max(record))) {
-      answer.more = true;
-      answer.next = answer.nodes.empty() ? wanted.after : answer.nodes.back().node;
-      break;
-    }
-    answer.nodes.push_back(std::move(record));
+  page.fill(
+      names_for(context, request),
+      [](const NameCopies& names, NodeId after) { return names.node_after(after); },
+      [&](const KnownName& known) -> std::optional<ns::NodeRecord> {
+        if (pattern && !pattern->matches(known.name)) return std::nullopt;
+        if (wanted.connected_only && known.standing != ns::NameStanding::held) return std::nullopt;
+        return node_record_of(known);
+      },
+      [&](std::uint32_t after) {
+        return list_nodes(context.membership,
+                          {pattern ? &*pattern : nullptr, NodeIndex{after}, wanted.connected_only,
+                           context.limits.page_records, context.limits.scan_records});
+      },
+      [&](NodeIndex index) {
+        const Session& session = *context.membership.sessions().find(index);
+        return record_of(title, session, context.membership.services(), context.now);
+      });
+  return ns::ListAnswer{page.take_records(), page.more(), page.next()};
+}
+
+/// The best claim of the whole network to a node's name.
+std::optional<KnownName> find_elsewhere(const HandlerContext& context, const Request& request,
+                                        std::string_view name) {
+  const NameCopies* names = names_for(context, request);
+  const auto known = names == nullptr ? std::nullopt : names->find(name);
+  return known && known->hub != context.facts.id && !known->claim->service ? known : std::nullopt;
+}
+
+Result<ns::ResolveAnswer, proto::Refusal> resolve(const HandlerContext& context,
+                                                  const Request& request, const std::string& name) {
+  const bool learning = context.names != nullptr && context.names->is_learning(context.now);
+  if (const auto known = find_elsewhere(context, request, name))
+    return ns::ResolveAnswer{known->claim->node, known->standing, learning};
+  if (const auto index = context.membership.directory().find(name)) {
+    const bool connected = context.membership.sessions().find(*index)->connected;
+    return ns::ResolveAnswer{make_id(context.facts.id, *index),
+                             connected ? ns::NameStanding::held : ns::NameStanding::away, learning};
   }
-  return answer;
+  return proto::Refusal{Status::not_found,
+                        "no node has the name '" + escaped(name, kQuotedMax) +
+                            "'; `gimnet nodes` shows those that are there" +
+                            (learning ? "; a link came up a moment ago, and names of other hubs "
+                                        "may be on their way: try again"
+                                      : ""),
+                        learning};
+}
+
+Result<ns::ReverseAnswer, proto::Refusal> reverse(const HandlerContext& context, NodeId node) {
+  if (const std::optional<NodeIndex> index = own_index(context.facts, node)) {
+    if (*index == NodeIndex{kHubIndex})
+      return ns::ReverseAnswer{context.facts.name, make_id(context.facts.id, *index)};
+    if (const Session* session = context.membership.sessions().find(*index))
+      return ns::ReverseAnswer{session->name.str(), make_id(context.facts.id, session->index)};
+  } else if (const NameCopies* names =
+                 context.names == nullptr ? nullptr : context.names->copies()) {
+    if (const auto known = names->find_node(node))
+      return ns::ReverseAnswer{std::string{known->name}, node};
+  }
+  return proto::Refusal{Status::not_found, "no node has that id"};
 }
 
 }  // namespace
@@ -57,7 +100,6 @@ proto::Payload handle_register(HandlerContext& context, const Request& request) 
             context.membership.rename(session, wanted.name, context.now, context.effects);
         if (failed) return *failed;
         return ns::RegisterNameAnswer{session.name.str(),
-                                      context.membership.directory().is_provisional(session.name),
                                       context.membership.sessions().token_of(session)};
       });
 }
@@ -77,32 +119,17 @@ proto::Payload handle_unregister(HandlerContext& context, const Request& request
 
 proto::Payload handle_resolve(HandlerContext& context, const Request& request) {
   return answer_to<ns::Resolve>(
-      request, [&context](const ns::Resolve& wanted) -> Result<ns::ResolveAnswer, proto::Refusal> {
-        const std::optional<NodeIndex> index = context.membership.directory().find(wanted.name);
-        if (!index) {
-          return proto::Refusal{Status::not_found,
-                                "no node has the name '" + escaped(wanted.name, kQuotedMax) +
-                                    "'; `gimnet nodes` shows those that are there"};
-        }
-        return ns::ResolveAnswer{make_id(context.facts.id, *index)};
-      });
+      request, [&](const ns::Resolve& wanted) { return resolve(context, request, wanted.name); });
 }
 
 proto::Payload handle_reverse(HandlerContext& context, const Request& request) {
   return answer_to<ns::Reverse>(
-      request, [&context](const ns::Reverse& wanted) -> Result<ns::ReverseAnswer, proto::Refusal> {
-        const std::optional<NodeIndex> index = own_index(context.facts, wanted.node);
-        if (index == NodeIndex{kHubIndex})
-          return ns::ReverseAnswer{context.facts.name, make_id(context.facts.id, *index)};
-        const Session* session = index ? context.membership.sessions().find(*index) : nullptr;
-        if (session == nullptr) return proto::Refusal{Status::not_found, "no node has that id"};
-        return ns::ReverseAnswer{session->name.str(), make_id(context.facts.id, session->index)};
-      });
+      request, [&](const ns::Reverse& wanted) { return reverse(context, wanted.node); });
 }
 
 proto::Payload handle_list(HandlerContext& context, const Request& request) {
-  return answer_to<ns::List>(request,
-                             [&context](const ns::List& wanted) { return list(context, wanted); });
+  return answer_to<ns::List>(
+      request, [&](const ns::List& wanted) { return list(context, request, wanted); });
 }
 
 }  // namespace gimnet::hub

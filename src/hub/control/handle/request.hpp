@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "hub/control/hub_facts.hpp"
+#include "hub/control/network_names.hpp"
 #include "hub/control/network_view.hpp"
 #include "hub/control/reloading.hpp"
 #include "hub/control/state/membership.hpp"
@@ -49,7 +50,7 @@ struct HandlerContext {
   const RequestCounters* requests = nullptr;         ///< or none
   Administration* administration = nullptr;          ///< or none
   NetworkView* network = nullptr;                    ///< or none: a hub alone
-  const NameExchange* names = nullptr;               ///< with `network`
+  const NetworkNames* names = nullptr;               ///< or none: a hub alone
   std::optional<CountsBegin> counts{};               ///< what begins with the answer
 };
 
@@ -58,6 +59,7 @@ struct Request {
   const Session& session;
   proto::ControlHeader header;
   std::span<const std::byte> payload;
+  bool own_only = false;  ///< it names this hub, or comes from another one: of own names alone
 };
 
 /// The payload of the answer.
@@ -81,6 +83,12 @@ template <class Message, class Grant>
 /// the answer is that it asked too often, and nothing is to change.
 [[nodiscard]] std::optional<proto::Refusal> count_declaration(HandlerContext& context,
                                                               const Session& session);
+
+/// The names of other hubs that a request is about; nullptr: none.
+[[nodiscard]] inline const NameCopies* names_for(const HandlerContext& context,
+                                                 const Request& request) {
+  return context.names == nullptr || request.own_only ? nullptr : context.names->copies();
+}
 
 /// How much fits in one page of records.
 class PageBudget {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/log.hpp"
+#include "hub/control/handle/network_page.hpp"
 #include "hub/control/state/listing.hpp"
 #include "hub/control/state/records.hpp"
 #include "proto/control/names.hpp"
@@ -98,6 +99,9 @@ Result<ns::AdvertiseAnswer, proto::Refusal> advertise(HandlerContext& context,
   const ServiceTerms* const standing =
       context.membership.services().provided(session.index, full_name);
   if (auto refusal = fault_of(context.limits, offer, standing)) return *refusal;
+  if (standing == nullptr) {
+    if (auto refusal = context.membership.service_name_refusal(full_name)) return *refusal;
+  }
   ServiceTerms terms;
   terms.message_type = offer.message_type;
   terms.instance = offer.instance;
@@ -116,6 +120,7 @@ Result<ns::AdvertiseAnswer, proto::Refusal> advertise(HandlerContext& context,
 }
 
 Result<ns::ServicesAnswer, proto::Refusal> services(const HandlerContext& context,
+                                                    const Request& request,
                                                     const ns::Services& wanted) {
   const auto pattern = proto::Pattern::parse(wanted.pattern);
   if (!wanted.pattern.empty() && !pattern) {
@@ -124,25 +129,22 @@ Result<ns::ServicesAnswer, proto::Refusal> services(const HandlerContext& contex
                               "' is no pattern: write a full name of at most 16 parts and 255 "
                               "bytes in which a part may be * or **"};
   }
-  const Listed<GroupIndex> listed =
-      list_services(context.membership.services(),
-                    {pattern ? &*pattern : nullptr, group_index_of(wanted.after), false,
-                     context.limits.page_records, context.limits.scan_records});
-  ns::ServicesAnswer answer;
-  answer.more = listed.more;
-  answer.next = listed.more ? group_id(context, listed.next) : GroupId{};
-  PageBudget budget(context.limits, wanted.records_max);
+  NetworkPage<GroupId, ns::ServiceRecord> page(context, wanted.after, wanted.records_max);
+  const Services& own = context.membership.services();
   const HubTitle title{context.facts.id, context.facts.name};
-  for (const GroupIndex index : listed.indices) {
-    ns::ServiceRecord record = record_of(title, *context.membership.services().find_group(index));
-    if (!budget.take(ns::page_bytes_max(record))) {
-      answer.more = true;
-      answer.next = answer.services.empty() ? wanted.after : answer.services.back().group;
-      break;
-    }
-    answer.services.push_back(std::move(record));
-  }
-  return answer;
+  page.fill(
+      names_for(context, request),
+      [](const NameCopies& names, GroupId after) { return names.group_after(after); },
+      [&](const KnownName& known) -> std::optional<ns::ServiceRecord> {
+        if (pattern && !pattern->matches(known.name)) return std::nullopt;
+        return service_record_of(known);
+      },
+      [&](std::uint32_t after) {
+        return list_services(own, {pattern ? &*pattern : nullptr, GroupIndex{after}, false,
+                                   context.limits.page_records, context.limits.scan_records});
+      },
+      [&](GroupIndex index) { return record_of(title, *own.find_group(index)); });
+  return ns::ServicesAnswer{page.take_records(), page.more(), page.next()};
 }
 
 }  // namespace
@@ -167,7 +169,7 @@ proto::Payload handle_withdraw(HandlerContext& context, const Request& request) 
 
 proto::Payload handle_services(HandlerContext& context, const Request& request) {
   return answer_to<ns::Services>(
-      request, [&](const ns::Services& wanted) { return services(context, wanted); });
+      request, [&](const ns::Services& wanted) { return services(context, request, wanted); });
 }
 
 proto::Payload handle_subscribe(HandlerContext& context, const Request& request) {
@@ -187,7 +189,7 @@ proto::Payload handle_subscribe(HandlerContext& context, const Request& request)
         if (!topic) return topic.error();
         ns::SubscribeAnswer answer;
         put_state(answer, HubTitle{context.facts.id, context.facts.name}, **topic,
-                  context.membership);
+                  context.membership, names_for(context, request));
         answer.window = (*topic)->window_of(request.session.index);
         answer.number = terms->number;
         if (answer.window != 0 && (!standing || standing->number != terms->number))

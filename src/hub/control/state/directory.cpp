@@ -19,12 +19,7 @@ std::string age_text(std::chrono::milliseconds age) {
 
 std::optional<NodeIndex> Directory::find(std::string_view name) const {
   const auto found = names_.find(name);
-  return found == names_.end() ? std::nullopt : std::optional{found->second.index};
-}
-
-bool Directory::is_provisional(std::string_view name) const {
-  const auto found = names_.find(name);
-  return found != names_.end() && found->second.standing == NameStanding::provisional;
+  return found == names_.end() ? std::nullopt : std::optional{found->second};
 }
 
 std::optional<proto::Goodbye> Directory::refusal(std::string_view name, const Session* claimant,
@@ -48,14 +43,9 @@ std::optional<proto::Goodbye> Directory::refusal(std::string_view name, const Se
           age_text(now - holder->connected_at) + "; end that one, or choose another name"};
 }
 
-void Directory::put(std::string_view name, NodeIndex index, NameStanding standing) {
-  const bool added = names_.emplace(std::string{name}, Holder{index, standing}).second;
+void Directory::put(std::string_view name, NodeIndex index) {
+  const bool added = names_.emplace(std::string{name}, index).second;
   GIMNET_CHECK(added);
-}
-
-void Directory::confirm(std::string_view name) {
-  const auto found = names_.find(name);
-  if (found != names_.end()) found->second.standing = NameStanding::final;
 }
 
 void Directory::remove(std::string_view name) {

@@ -12,27 +12,16 @@
 
 namespace gimnet::hub {
 
-/// Is a name its holder's for good, or until all hubs have agreed? A hub without links is the whole
-/// network: it makes every name final at once. Provisional ones, Directory::confirm(),
-/// Membership::name_decided() and NameDecided are for hubs that meet (docs/protocol.md, section 8),
-/// and only tests make them until there are links.
-enum class NameStanding : std::uint8_t { final, provisional };
-
 /// Names of nodes: each has one holder. A live holder keeps it against everybody; one within its
 /// grace time keeps it against nobody but gets it back if nobody took it. In the order of names,
 /// which no choice of names can make slow, and which finds at once all that begin alike. Thread
 /// safety: none. Limits: one name a session.
 class Directory {
  public:
-  struct Holder {
-    NodeIndex index;
-    NameStanding standing = NameStanding::final;
-  };
-  using Names = std::map<std::string, Holder, std::less<>>;
+  using Names = std::map<std::string, NodeIndex, std::less<>>;
 
   /// The index of the node that holds the name.
   [[nodiscard]] std::optional<NodeIndex> find(std::string_view name) const;
-  [[nodiscard]] bool is_provisional(std::string_view name) const;
 
   /// Why `claimant` (nullptr: somebody new) cannot have the name; nothing if it can, perhaps from a
   /// holder who is away and whom the caller then has to end.
@@ -42,9 +31,7 @@ class Directory {
                                                       std::chrono::milliseconds now) const;
 
   /// REQUIRES: nobody holds the name.
-  void put(std::string_view name, NodeIndex index, NameStanding standing = NameStanding::final);
-  /// The name is its holder's for good. Nothing happens for a name that nobody holds.
-  void confirm(std::string_view name);
+  void put(std::string_view name, NodeIndex index);
   /// Nothing happens for a name that nobody holds, the empty one included.
   void remove(std::string_view name);
   [[nodiscard]] const Names& names() const { return names_; }

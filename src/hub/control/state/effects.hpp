@@ -90,12 +90,11 @@ struct SubscribersChanged {
 /// Keep what Membership::durable() says where it outlives the hub, then call state_kept().
 struct StateDue {};
 
-/// Tell a node what became of its claim to a name.
-struct NameDecided {
+/// Tell a node that a node of another hub has its name, or the full name of its service.
+struct NameLost {
   NodeIndex node;
   std::string name;
-  bool confirmed = false;
-  NodeId holder{};  ///< who has it, if it is not confirmed
+  NodeId holder;
   std::string sentence;
 };
 /// Those who watch are to hear of a node. Its record is looked up; the name is that of a node which
@@ -116,7 +115,7 @@ struct ServiceNoted {
 
 using Effect = std::variant<NodeChanged, GroupChanged, ProviderChanged, MemberChanged, SessionEnded,
                             ServiceMoved, PaceDue, PaceEnded, RetainedDropped, SubscribersChanged,
-                            CloseDue, RenumberDue, StateDue, NameDecided, NodeNoted, ServiceNoted>;
+                            CloseDue, RenumberDue, StateDue, NameLost, NodeNoted, ServiceNoted>;
 using Effects = std::vector<Effect>;
 
 }  // namespace gimnet::hub

@@ -13,10 +13,10 @@ void Journal::add(proto::ns::Change change) {
   GIMNET_CHECK(writer.finish() == BITESTREAM_OK);
   Note note;
   if (change.service) {
-    note.subject = group_index_of(change.service->group);
+    note.subject = change.service->group;
     note.name = change.service->name;
   } else {
-    note.subject = node_index_of(change.node->node);
+    note.subject = change.node->node;
     note.name = change.node->name;
   }
   note.former_name = change.former_name;

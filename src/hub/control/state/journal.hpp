@@ -21,7 +21,7 @@ class Journal {
  public:
   /// A change as it travels, and what decides who hears of it.
   struct Note {
-    std::variant<NodeIndex, GroupIndex> subject;
+    std::variant<NodeId, GroupId> subject;
     std::string name;  ///< "" for a node without one
     std::string former_name;
     std::vector<std::byte> bytes;  ///< a value of WATCH_EVENTS
@@ -39,6 +39,13 @@ class Journal {
   void add(proto::ns::Change change);
   /// Counts a change that is not kept. REQUIRES: !keeps().
   void pass() { ++version_; }
+
+  /// More changed than can be told: all that is kept goes, and everybody begins anew.
+  void begin_again() {
+    ++version_;
+    notes_.clear();
+    bytes_ = 0;
+  }
 
   [[nodiscard]] std::uint64_t epoch() const { return epoch_; }
   /// Of the last change; 0: there was none.

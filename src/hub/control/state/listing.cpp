@@ -77,11 +77,9 @@ Listed<Index> list_by_id(const ById& by_id, const ListingRequest<Index>& request
 std::optional<Listed<NodeIndex>> list_few_nodes(const Membership& membership,
                                                 const ListingRequest<NodeIndex>& request) {
   const auto& sessions = membership.sessions();
-  return list_by_name(
-      membership.directory().names(), request, [&](const Directory::Holder& holder) {
-        return request.connected_only && !sessions.find(holder.index)->connected ? NodeIndex{}
-                                                                                 : holder.index;
-      });
+  return list_by_name(membership.directory().names(), request, [&](NodeIndex holder) {
+    return request.connected_only && !sessions.find(holder)->connected ? NodeIndex{} : holder;
+  });
 }
 
 std::optional<Listed<GroupIndex>> list_few_services(const Services& services,

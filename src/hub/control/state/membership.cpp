@@ -35,8 +35,7 @@ Result<Membership::Joined, proto::Goodbye> Membership::join(const JoinRequest& r
   const Sessions::Claim claim =
       sessions_.claim({request.token, request.name, request.identity, request.wall});
   if (!request.name.empty()) {
-    if (std::optional<proto::Goodbye> refusal =
-            directory_.refusal(request.name, claim.session, sessions_, now)) {
+    if (std::optional<proto::Goodbye> refusal = name_refusal(request.name, claim.session, now)) {
       return std::move(*refusal);
     }
   }
@@ -117,30 +116,18 @@ std::optional<proto::Refusal> Membership::rename(Session& session, const std::st
                                                  milliseconds now, Effects& effects) {
   if (name == session.name) return std::nullopt;
   if (!name.empty()) {
-    if (const std::optional<proto::Goodbye> refusal =
-            directory_.refusal(name, &session, sessions_, now)) {
-      const bool taken = refusal->code == GoodbyeCode::name_taken;
-      return proto::Refusal{taken ? proto::Status::taken : proto::Status::bad_request,
-                            refusal->sentence};
+    if (const std::optional<proto::Goodbye> refusal = name_refusal(name, &session, now)) {
+      const proto::Status status = refusal->code == GoodbyeCode::name_taken ? proto::Status::taken
+                                   : refusal->code == GoodbyeCode::hub_full
+                                       ? proto::Status::limit
+                                       : proto::Status::bad_request;
+      return proto::Refusal{status, refusal->sentence};
     }
     end_absent_holder(name, &session, now, effects);
   }
   take_name(session, name, now, effects);
   session.token_name = name;
   return std::nullopt;
-}
-
-void Membership::name_decided(Session& session, const NameDecision& decision, milliseconds now,
-                              Effects& effects) {
-  const std::string name = session.name.str();
-  if (!directory_.is_provisional(name)) return;
-  if (decision.confirmed) {
-    directory_.confirm(name);
-  } else {
-    take_name(session, "", now, effects);
-  }
-  effects.emplace_back(
-      NameDecided{session.index, name, decision.confirmed, decision.holder, decision.sentence});
 }
 
 std::string Membership::kick(Session& session, const std::string& sentence, milliseconds now,
@@ -215,10 +202,8 @@ std::optional<proto::Refusal> Membership::renumber(Session& session, NodeIndex i
   const NodeIndex former = session.index;
   sessions_.renumber(session, index, now);
   if (keeping_due(now)) effects.emplace_back(StateDue{});
-  const NameStanding standing =
-      directory_.is_provisional(session.name) ? NameStanding::provisional : NameStanding::final;
   directory_.remove(session.name);
-  if (!session.name.empty()) directory_.put(session.name, index, standing);
+  if (!session.name.empty()) directory_.put(session.name, index);
   for (Redeclaring& due : redeclaring_) {
     if (due.index == former && due.generation == session.place.generation) due.index = index;
   }
@@ -353,7 +338,7 @@ void Membership::take_name(Session& session, const std::string& name, millisecon
     services_.node_renamed(session.index, now, effects);
     directory_.remove(former);
   }
-  if (!name.empty()) directory_.put(name, session.index, standing_);
+  if (!name.empty()) directory_.put(name, session.index);
   // A node that has not been attached yet has nothing to change: it will be told of as one that
   // joined.
   if (session.attachment > 0)

@@ -14,6 +14,7 @@
 #include "hub/control/state/identity.hpp"
 #include "hub/control/state/services.hpp"
 #include "hub/control/state/sessions.hpp"
+#include "hub/network/state/name_copies.hpp"
 
 namespace gimnet::hub {
 
@@ -96,19 +97,16 @@ class Membership {
                                                      std::chrono::milliseconds now,
                                                      Effects& effects);
 
-  /// What became of a claim to a name.
-  struct NameDecision {
-    bool confirmed = true;
-    NodeId holder{};       ///< not confirmed: who has the name now
-    std::string sentence;  ///< not confirmed: why
-  };
-  /// The network decided on the session's name: it is final, or a rival's. A name that is final
-  /// already stays so.
-  void name_decided(Session& session, const NameDecision& decision, std::chrono::milliseconds now,
-                    Effects& effects);
-  /// Names taken from now on are final at once, as on a hub that is the whole network, or wait for
-  /// name_decided().
-  void decide_names(NameStanding standing) { standing_ = standing; }
+  /// The network of hubs has these names from now on: nobody gets one that another hub holds.
+  /// Lifetime: they outlive this.
+  void join_network(const NameCopies& names) { names_ = &names; }
+  /// A node of another hub has the better claim to a name of this hub: its node goes on without
+  /// one, or its service ends. Nothing happens for a name that nobody here has.
+  void lose_name(const std::string& name, NodeId holder, const std::string& sentence,
+                 std::chrono::milliseconds now, Effects& effects);
+  /// Why nobody may advertise a service of that full name: a node has it as its name.
+  [[nodiscard]] std::optional<proto::Refusal> service_name_refusal(
+      std::string_view full_name) const;
 
   /// The hub stood still for so long until now, and nobody could come back or declare anything:
   /// what would have run out meanwhile has its time again. To be said before tick().
@@ -139,6 +137,13 @@ class Membership {
                                                            const Sessions::Claim& claim,
                                                            std::chrono::milliseconds now,
                                                            Effects& effects);
+  /// Why `claimant` (nullptr: somebody new) cannot have the name.
+  [[nodiscard]] std::optional<proto::Goodbye> name_refusal(std::string_view name,
+                                                           const Session* claimant,
+                                                           std::chrono::milliseconds now) const;
+  /// The same, for what other hubs and services have.
+  [[nodiscard]] std::optional<proto::Goodbye> network_refusal(std::string_view name,
+                                                              std::chrono::milliseconds now) const;
   /// Is nobody waiting for the session's node to come back?
   [[nodiscard]] static bool ends_with_connection(const Session& session, const Ending& ending);
   /// Takes an index for a session that there is. Errors: as of renumber().
@@ -167,7 +172,7 @@ class Membership {
   Sessions sessions_;
   Directory directory_;
   Services services_;
-  NameStanding standing_ = NameStanding::final;
+  const NameCopies* names_ = nullptr;  ///< or none: a hub that has had no link yet
   DueList<Redeclaring> redeclaring_;
 };
 

@@ -124,6 +124,12 @@ class Services {
     unused_.put_off(time, latest);
   }
 
+  /// Another hub has a service of that name, another one than before, or none any more: those here
+  /// that subscribed to it are told.
+  void note_moved(std::string_view full_name, Effects& effects);
+  /// The same of all services that nobody here provides.
+  void note_all_moved(Effects& effects);
+
   /// Grows with each ServiceMoved.
   [[nodiscard]] std::uint64_t changes() const { return changes_; }
   /// What the node subscribed to and subscribers were told of since that change, the latest last.

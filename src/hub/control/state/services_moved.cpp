@@ -131,6 +131,17 @@ void Services::tell_subscribers(Topic& topic, Effects& effects) {
   effects.emplace_back(ServiceMoved{std::string{topic.full_name}});
 }
 
+void Services::note_moved(std::string_view full_name, Effects& effects) {
+  const auto found = topics_.find(full_name);
+  if (found != topics_.end() && !found->second.provided()) tell_subscribers(found->second, effects);
+}
+
+void Services::note_all_moved(Effects& effects) {
+  for (auto& [name, topic] : topics_) {
+    if (!topic.provided()) tell_subscribers(topic, effects);
+  }
+}
+
 std::vector<const Topic*> Services::moved_since(NodeIndex node, std::uint64_t change) const {
   std::vector<const Topic*> moved;
   const auto found = nodes_.find(node);

@@ -18,6 +18,14 @@ constexpr std::size_t kChangeBytesMax = 6 * 1024;
 /// fit.
 constexpr std::size_t kRecordBytesLeast = 32;
 
+/// The first of this hub's own that has an id behind `last`.
+template <class Map, class Id>
+auto own_behind(const Map& all, HubId hub, Id last) {
+  if (hub_of(last) > hub) return all.end();
+  if (hub_of(last) < hub) return all.begin();
+  return all.upper_bound(typename Map::key_type{index_of(last)});
+}
+
 }  // namespace
 
 Watches::Watches(HubTitle hub, std::uint64_t epoch, const Limits& limits)
@@ -59,6 +67,11 @@ void Watches::note(const ServiceNoted& noted, const Membership& membership, mill
     change.service->name = noted.full_name;
   }
   journal_.add(std::move(change));
+}
+
+void Watches::note(const NameChange& noted) {
+  if (!journal_.keeps()) return journal_.pass();
+  journal_.add(change_of(noted, names_->hub_name(noted.hub)));
 }
 
 Result<ns::WatchAnswer, proto::Refusal> Watches::watch(NodeIndex node, const ns::Watch& wanted) {
@@ -222,47 +235,63 @@ void Watches::add_changes(Watch& watch, Page& page, Turn& turn) const {
 void Watches::add_nodes(Watch& watch, Page& page, Turn& turn) const {
   if ((watch.subjects & ns::kWatchNodes) == 0) return next_phase(watch);
   if (add_few(watch, page, turn)) return;
-  const auto& all = turn.membership.sessions().all();
-  auto entry = all.upper_bound(watch.last_node);
-  for (; entry != all.end() && turn.work > 0 && !page.full; ++entry, --turn.work) {
-    watch.last_node = entry->first;
-    if (fits(watch, entry->second.name)) add_node(entry->second, page, turn);
-  }
-  if (entry == all.end()) next_phase(watch);
+  add_by_id(
+      watch, page, turn, watch.last_node, turn.membership.sessions().all(),
+      [this](NodeId last) { return names_->node_after(last); },
+      [&](const Session& session) {
+        if (fits(watch, session.name)) add_node(session, page, turn);
+      });
 }
 
 void Watches::add_services(Watch& watch, Page& page, Turn& turn) const {
   if ((watch.subjects & ns::kWatchServices) == 0) return next_phase(watch);
   if (add_few(watch, page, turn)) return;
-  const auto& all = turn.membership.services().groups();
-  auto entry = all.upper_bound(watch.last_group);
-  for (; entry != all.end() && turn.work > 0 && !page.full; ++entry, --turn.work) {
-    watch.last_group = entry->first;
-    if (entry->second->provided() && fits(watch, entry->second->full_name))
-      add_service(*entry->second, page);
+  add_by_id(
+      watch, page, turn, watch.last_group, turn.membership.services().groups(),
+      [this](GroupId last) { return names_->group_after(last); },
+      [&](const Topic* topic) {
+        if (topic->provided() && fits(watch, topic->full_name)) add_service(*topic, page);
+      });
+}
+
+template <class Id, class Own, class Behind, class Add>
+void Watches::add_by_id(Watch& watch, Page& page, Turn& turn, Id& last, const Own& all,
+                        Behind behind, Add add_own) const {
+  for (; turn.work > 0 && !page.full; --turn.work) {
+    const auto own = own_behind(all, hub_.id, last);
+    auto other = names_ == nullptr ? std::nullopt : behind(last);
+    if (other && other->hub == hub_.id) other = behind(make_id<Id>(hub_.id, kIndexMask));
+    if (own != all.end() && (!other || make_id(hub_.id, own->first) < id_of<Id>(*other))) {
+      last = make_id(hub_.id, own->first);
+      add_own(own->second);
+    } else if (other) {
+      last = id_of<Id>(*other);
+      if (fits(watch, other->name)) add_other(*other, page);
+    } else {
+      return next_phase(watch);
+    }
   }
-  if (entry == all.end()) next_phase(watch);
 }
 
 bool Watches::add_few(Watch& watch, Page& page, Turn& turn) const {
-  if (!watch.few || !watch.pattern) return false;
+  if (!watch.few || !watch.pattern || names_ != nullptr) return false;
   if (page.full || turn.work == 0) return true;  // at another time
   const std::size_t records = (limits_.watch_event_bytes - kChangeBytesMax) / kRecordBytesLeast;
   const proto::Pattern* const pattern = &*watch.pattern;
   const std::size_t work = limits_.scan_records;
   if (watch.phase == Phase::nodes) {
-    const auto listed =
-        list_few_nodes(turn.membership, {pattern, watch.last_node, false, records, work});
+    const auto listed = list_few_nodes(
+        turn.membership, {pattern, node_index_of(watch.last_node), false, records, work});
     return add_listed(watch, page, turn, listed, [&](NodeIndex index) {
-      watch.last_node = index;
+      watch.last_node = make_id(hub_.id, index);
       add_node(*turn.membership.sessions().find(index), page, turn);
     });
   }
   const Services& services = turn.membership.services();
-  const auto listed =
-      list_few_services(services, {pattern, watch.last_group, false, records, work});
+  const auto listed = list_few_services(
+      services, {pattern, group_index_of(watch.last_group), false, records, work});
   return add_listed(watch, page, turn, listed, [&](GroupIndex index) {
-    watch.last_group = index;
+    watch.last_group = make_id(hub_.id, index);
     add_service(*services.find_group(index), page);
   });
 }
@@ -302,6 +331,12 @@ void Watches::add_service(const Topic& topic, Page& page) const {
   add(change, page);
 }
 
+void Watches::add_other(const KnownName& known, Page& page) const {
+  ns::Change change = change_of(ns::ChangeKind::present, known);
+  change.version = journal_.version();
+  add(change, page);
+}
+
 void Watches::add_mark(ns::ChangeKind kind, Page& page) const {
   ns::Change change;
   change.kind = kind;
@@ -334,8 +369,8 @@ proto::Payload Watches::finish(Watch& watch, Page page) const {
 }
 
 bool Watches::wants(const Watch& watch, const Journal::Note& note) {
-  const NodeIndex* const node = std::get_if<NodeIndex>(&note.subject);
-  const GroupIndex* const group = std::get_if<GroupIndex>(&note.subject);
+  const NodeId* const node = std::get_if<NodeId>(&note.subject);
+  const GroupId* const group = std::get_if<GroupId>(&note.subject);
   if ((watch.subjects & (group != nullptr ? ns::kWatchServices : ns::kWatchNodes)) == 0)
     return false;
   // What the snapshot has yet to look at, it will show as it is then.

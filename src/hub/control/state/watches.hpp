@@ -26,6 +26,12 @@ class Watches {
   /// Keeps what the effect says for those who watch. REQUIRES: the effects before it were noted.
   void note(const NodeNoted& noted, const Membership& membership, std::chrono::milliseconds now);
   void note(const ServiceNoted& noted, const Membership& membership, std::chrono::milliseconds now);
+  /// The network of hubs has these names from now on: they are told of, too. Lifetime: they outlive
+  /// this.
+  void join_network(const NameCopies& names) { names_ = &names; }
+  void note(const NameChange& noted);
+  /// The names of a whole hub went: everybody is told the present state anew.
+  void begin_again() { journal_.begin_again(); }
 
   /// Begins a watch, or one of that number anew. Errors: bad_request, limit.
   [[nodiscard]] Result<proto::ns::WatchAnswer, proto::Refusal> watch(
@@ -55,8 +61,8 @@ class Watches {
     std::uint8_t subjects = proto::ns::kWatchAll;
     std::optional<proto::Pattern> pattern;  ///< nothing: all
     Phase phase = Phase::begin;
-    NodeIndex last_node;        ///< that the snapshot looked at
-    GroupIndex last_group;      ///< the same of services
+    NodeId last_node;           ///< that the snapshot looked at
+    GroupId last_group;         ///< the same of services
     bool few = true;            ///< may what the snapshot is about be found by name?
     std::uint64_t seen = 0;     ///< version up to which changes were looked at
     std::size_t under_way = 0;  ///< WATCH_EVENTS that were not taken yet
@@ -87,6 +93,10 @@ class Watches {
   void add_changes(Watch& watch, Page& page, Turn& turn) const;
   void add_nodes(Watch& watch, Page& page, Turn& turn) const;
   void add_services(Watch& watch, Page& page, Turn& turn) const;
+  /// By id, own ones among those of other hubs.
+  template <class Id, class Own, class Behind, class Add>
+  void add_by_id(Watch& watch, Page& page, Turn& turn, Id& last, const Own& all, Behind behind,
+                 Add add_own) const;
   /// By name, where those whose names begin as the pattern does are few. False: they are not, and
   /// nothing was added.
   [[nodiscard]] bool add_few(Watch& watch, Page& page, Turn& turn) const;
@@ -96,6 +106,8 @@ class Watches {
                                        const std::optional<List>& listed, Add add);
   void add_node(const Session& session, Page& page, const Turn& turn) const;
   void add_service(const Topic& topic, Page& page) const;
+  /// A node or a service of another hub.
+  void add_other(const KnownName& known, Page& page) const;
   /// What the snapshot is about next, behind the nodes or the services.
   static void next_phase(Watch& watch);
   void add_mark(proto::ns::ChangeKind kind, Page& page) const;
@@ -107,6 +119,7 @@ class Watches {
   const HubTitle hub_;
   const Limits& limits_;
   Journal journal_;
+  const NameCopies* names_ = nullptr;  ///< or none: a hub that has had no link yet
   std::map<NodeIndex, Watcher> watchers_;
   NodeIndex last_served_;
   std::size_t watches_ = 0;

@@ -38,13 +38,13 @@ NameCopies::Copy* NameCopies::find_copy(const HubRun& run) {
 KnownName NameCopies::known_name(const NameIndex::Claims::value_type& entry) const {
   const auto& [key, claim] = entry;
   const Copy& copy = copies_.at(key.hub);
-  KnownName known{key.name, key.hub, &claim, Standing::held, {}};
+  KnownName known{key.name, key.hub, copy.hub_name, &claim, proto::ns::NameStanding::held, {}};
   const bool former = claim.version == 0;
   if (former || copy.unreachable_until) {
-    known.standing = Standing::unreachable;
+    known.standing = proto::ns::NameStanding::unreachable;
     known.until = former && copy.former_until ? *copy.former_until : *copy.unreachable_until;
   } else if (claim.state == NameState::away) {
-    known.standing = Standing::away;
+    known.standing = proto::ns::NameStanding::away;
   }
   return known;
 }
@@ -80,7 +80,7 @@ std::uint32_t NameCopies::rank_for(std::string_view name, NodeId node) const {
     const auto& [key, claim] = entry;
     if (claim.state == NameState::deleted) continue;
     if (claim.node == node) return claim.rank;
-    if (key.hub == options_.self.hub || known_name(entry).standing != Standing::held)
+    if (key.hub == options_.self.hub || known_name(entry).standing != proto::ns::NameStanding::held)
       rank = std::max(rank, claim.rank);
   }
   return rank == std::numeric_limits<std::uint32_t>::max() ? rank : rank + 1;
@@ -165,6 +165,11 @@ void NameCopies::drop(HubId hub) {
   while (!copy.by_version.empty()) erase(copy, copy.by_version.begin()->second);
   copies_.erase(found);
   ++dropped_copies_;
+}
+
+void NameCopies::set_hub_name(HubId hub, std::string_view name) {
+  const auto found = copies_.find(hub);
+  if (found != copies_.end() && found->second.hub_name != name) found->second.hub_name = name;
 }
 
 bool NameCopies::forget(milliseconds now) {
@@ -281,7 +286,8 @@ void NameCopies::forget_marks(Copy& copy) {
 /// Services go with the names of their nodes.
 bool NameCopies::is_lost_to(const KnownName& other) const {
   const auto mine = index_.find(other.name, options_.self.hub);
-  if (!mine || other.hub == options_.self.hub || other.standing == Standing::unreachable)
+  if (!mine || other.hub == options_.self.hub ||
+      other.standing == proto::ns::NameStanding::unreachable)
     return false;
   const NameClaim& claim = (*mine)->second;
   if (claim.state == NameState::deleted || (claim.service && other.claim->service)) return false;
@@ -357,7 +363,7 @@ std::optional<KnownName> NameCopies::find(std::string_view name) const {
     if (entry.second.state == NameState::deleted) continue;
     const KnownName known = known_name(entry);
     const auto reachable = [](const KnownName& one) {
-      return one.standing != Standing::unreachable;
+      return one.standing != proto::ns::NameStanding::unreachable;
     };
     if (!best || reachable(known) > reachable(*best) ||
         (reachable(known) == reachable(*best) && wins(*known.claim, *best->claim)))

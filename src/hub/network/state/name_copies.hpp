@@ -9,6 +9,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -23,21 +24,25 @@ struct HubRun {
   friend auto operator<=>(const HubRun&, const HubRun&) = default;
 };
 
-/// A name as those see it that ask for it.
-enum class Standing : std::uint8_t {
-  held,
-  away,         ///< its node has lost its connection: a newcomer may take the name
-  unreachable,  ///< its hub cannot be reached, or has restarted: nobody may take it for a while
-};
-
 /// A name as this hub knows it. Valid until: something changes.
 struct KnownName {
   std::string_view name;
   HubId hub;
+  std::string_view hub_name;
   const proto::route::NameClaim* claim = nullptr;
-  Standing standing = Standing::held;
+  proto::ns::NameStanding standing = proto::ns::NameStanding::held;
   std::chrono::milliseconds until{};  ///< unreachable: when it is free
 };
+
+/// The id by which listings have it: NodeId of a node, GroupId of a service.
+template <class Id>
+[[nodiscard]] Id id_of(const KnownName& known) {
+  if constexpr (std::is_same_v<Id, NodeId>) {
+    return known.claim->node;
+  } else {
+    return known.claim->service->group;
+  }
+}
 
 /// A name of another hub came, changed or went.
 struct NameChange {
@@ -92,6 +97,13 @@ class NameCopies {
   /// These hubs can be reached now, besides this one. REQUIRES: ascending, each hub id once.
   /// Answers those whose copy has begun, or may go on.
   std::vector<HubId> set_reachable(std::span<const HubRun> hubs, std::chrono::milliseconds now);
+  /// Names the hub for people.
+  void set_hub_name(HubId hub, std::string_view name);
+  /// "": it is not known.
+  [[nodiscard]] std::string_view hub_name(HubId hub) const {
+    const auto found = copies_.find(hub);
+    return found == copies_.end() ? std::string_view{} : found->second.hub_name;
+  }
   /// Drops copies of hubs that could not be reached for the grace time, and names of the process
   /// before. True: something was dropped.
   bool forget(std::chrono::milliseconds now);
@@ -136,6 +148,7 @@ class NameCopies {
   /// Version 0 is that of a name of the process before.
   struct Copy {
     proto::HubInstance instance;
+    std::string hub_name;
     std::uint64_t version = 0;    ///< complete up to it
     std::uint64_t forgotten = 0;  ///< marks up to it may be missing
     std::map<std::uint64_t, Place> by_version;

@@ -97,6 +97,11 @@ void NameExchange::set_reachable(const NetworkMap& map, const RecordStore& store
       hubs.push_back({way.hub.hub, identity->instance});
   }
   set_reachable(hubs, now);
+  for (const HubRun& run : hubs) {
+    const auto way = std::ranges::lower_bound(map.ways(), run.hub, {},
+                                              [](const Way& each) { return each.hub.hub; });
+    if (const auto* head = store.find(way->hub)->head()) copies_.set_hub_name(run.hub, head->name);
+  }
 }
 
 void NameExchange::set_reachable(std::span<const HubRun> hubs, milliseconds now) {

@@ -128,8 +128,8 @@ inline constexpr std::array<Call, 31> kCalls{{
      true},
     {"nif_ping_hub", [](nif_node* node) { return nif_ping_hub(node, nullptr, nullptr, 0); },
      nullptr, true},
-    {"nif_register", [](nif_node* node) { return nif_register(node, "a", nullptr, 0); },
-     [](nif_node* node) { return nif_register(node, nullptr, nullptr, 0); }, true},
+    {"nif_register", [](nif_node* node) { return nif_register(node, "a", 0); },
+     [](nif_node* node) { return nif_register(node, nullptr, 0); }, true},
     {"nif_unregister", [](nif_node* node) { return nif_unregister(node, 0); }, nullptr, true},
     {"nif_watch",
      [](nif_node* node) {

@@ -38,9 +38,7 @@ class RecordingHost final : public InboundHost {
     return moved_is_news;
   }
   [[nodiscard]] bool on_watch_events(const proto::ns::WatchEvents&) override { return true; }
-  void on_name_decided(const std::string& name, bool lost) override {
-    decided = (lost ? "lost " : "kept ") + name;
-  }
+  void on_name_lost(const std::string& name) override { lost_name = name; }
   void on_taken(std::uint32_t, const proto::Taken& taken) override {
     taken_received.push_back(taken);
   }
@@ -82,7 +80,7 @@ class RecordingHost final : public InboundHost {
   std::vector<std::uint32_t> lost_groups;
   bool moved_is_news = true;
   std::uint32_t counted_group = 0;  ///< its messages count in a window
-  std::string decided;
+  std::string lost_name;
   std::optional<ReportedMessages::Start> start;  ///< of the message that reports are about
   std::vector<proto::Taken> taken_sent;
   std::vector<proto::Taken> taken_received;

@@ -133,7 +133,6 @@ TEST_F(NamesTest, ANodeTakesAnotherNameAndGivesItBack) {
   const auto renamed = ask<ns::RegisterNameAnswer>(robot, ns::RegisterName{"forklift"});
   ASSERT_TRUE(renamed);
   EXPECT_EQ(renamed->name, "forklift");
-  EXPECT_FALSE(renamed->provisional);
   EXPECT_FALSE(renamed->token.empty());
   EXPECT_EQ(ask<ns::ResolveAnswer>(viewer, ns::Resolve{"forklift"})->node, robot.id);
   EXPECT_EQ(ask<ns::ResolveAnswer>(viewer, ns::Resolve{"robot"}).error().status, Status::not_found);

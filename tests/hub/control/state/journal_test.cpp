@@ -7,13 +7,17 @@ namespace {
 
 namespace ns = proto::ns;
 
-using Subject = std::variant<NodeIndex, GroupIndex>;
+using Subject = std::variant<NodeId, GroupId>;
+
+constexpr HubId kHub{7};
+
+Subject node(std::uint32_t index) { return make_id<NodeId>(kHub, index); }
 
 ns::Change node_change(std::uint32_t index, std::size_t name_bytes = 5) {
   ns::Change change;
   change.kind = ns::ChangeKind::joined;
   change.node.emplace();
-  change.node->node = make_id<NodeId>(HubId{7}, index);
+  change.node->node = make_id<NodeId>(kHub, index);
   change.node->name = std::string(name_bytes, 'n');
   return change;
 }
@@ -27,7 +31,7 @@ TEST(Journal, NumbersChangesWithoutGaps) {
   for (std::uint32_t i = 1; i <= 5; ++i) journal.add(node_change(i));
   EXPECT_EQ(journal.version(), 5u);
   EXPECT_EQ(journal.epoch(), 9u);
-  for (std::uint32_t i = 1; i <= 5; ++i) EXPECT_EQ(journal.at(i).subject, Subject{NodeIndex{i}});
+  for (std::uint32_t i = 1; i <= 5; ++i) EXPECT_EQ(journal.at(i).subject, node(i));
   EXPECT_FALSE(journal.reaches(6)) << "the future";
 }
 
@@ -41,8 +45,8 @@ TEST(Journal, KeepsSoManyChanges) {
   journal.add(node_change(4));
   EXPECT_FALSE(journal.reaches(0));
   EXPECT_TRUE(journal.reaches(1));
-  EXPECT_EQ(journal.at(2).subject, Subject{NodeIndex{2}});
-  EXPECT_EQ(journal.at(4).subject, Subject{NodeIndex{4}});
+  EXPECT_EQ(journal.at(2).subject, node(2));
+  EXPECT_EQ(journal.at(4).subject, node(4));
 }
 
 TEST(Journal, KeepsSoManyBytes) {
@@ -68,7 +72,7 @@ TEST(Journal, OnlyCountsUntilItBegins) {
   journal.add(node_change(4));
   EXPECT_FALSE(journal.reaches(2)) << "what was only counted";
   EXPECT_TRUE(journal.reaches(3));
-  EXPECT_EQ(journal.at(4).subject, Subject{NodeIndex{4}});
+  EXPECT_EQ(journal.at(4).subject, node(4));
 }
 
 TEST(Journal, TellsServicesFromNodes) {
@@ -78,11 +82,23 @@ TEST(Journal, TellsServicesFromNodes) {
   ns::Change change;
   change.kind = ns::ChangeKind::advertised;
   change.service.emplace();
-  change.service->group = make_id<GroupId>(HubId{7}, 3);
+  change.service->group = make_id<GroupId>(kHub, 3);
   change.service->name = "robot/odom";
   journal.add(std::move(change));
-  EXPECT_EQ(journal.at(1).subject, Subject{GroupIndex{3}});
+  EXPECT_EQ(journal.at(1).subject, Subject{make_id<GroupId>(kHub, 3)});
   EXPECT_EQ(journal.at(1).name, "robot/odom");
+}
+
+TEST(Journal, ReachesNothingThatWasBeforeItBeganAgain) {
+  const Limits limits;
+  Journal journal(1, limits);
+  journal.begin();
+  journal.add(node_change(1));
+  journal.begin_again();
+  EXPECT_FALSE(journal.reaches(1));
+  EXPECT_TRUE(journal.reaches(journal.version()));
+  journal.add(node_change(2));
+  EXPECT_EQ(journal.at(journal.version()).subject, node(2));
 }
 
 }  // namespace

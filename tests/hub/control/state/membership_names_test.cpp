@@ -3,7 +3,7 @@
 #include "hub/control/state/membership.hpp"
 #include "tests/hub/control/state/support/membership_rig.hpp"
 
-// The names of nodes: another one while a node is there, and names that other hubs decide on.
+// The names of nodes: another one while a node is there.
 
 namespace gimnet::hub {
 namespace {
@@ -53,37 +53,6 @@ TEST_F(MembershipNamesTest, ANewNameWithdrawsWhatTheNodeProvides) {
   EXPECT_EQ(membership_.services().services_of(robot->index), 0u);
   EXPECT_EQ(membership_.services().provided(), 0u);
   EXPECT_EQ(membership_.services().topics(), 2u) << "both subscriptions wait on";
-}
-
-TEST_F(MembershipNamesTest, OneHubDecidesOnNamesAtOnce) {
-  Session* robot = join("robot");
-  EXPECT_FALSE(membership_.directory().is_provisional("robot"));
-  effects_.clear();
-  membership_.name_decided(*robot, {.confirmed = false, .holder = NodeId{9}, .sentence = "late"},
-                           1s, effects_);
-  EXPECT_TRUE(effects_.empty()) << "final is final";
-  EXPECT_EQ(robot->name, "robot");
-}
-
-TEST_F(MembershipNamesTest, AProvisionalNameIsConfirmedOrLost) {
-  membership_.decide_names(NameStanding::provisional);
-  Session* robot = join("robot");
-  Session* rival = join("rival");
-  EXPECT_TRUE(membership_.directory().is_provisional("robot"));
-  effects_.clear();
-  membership_.name_decided(*robot, {}, 1s, effects_);
-  EXPECT_FALSE(membership_.directory().is_provisional("robot"));
-  ASSERT_EQ(effects_.size(), 1u);
-  EXPECT_TRUE(std::get<NameDecided>(effects_[0]).confirmed);
-  effects_.clear();
-  membership_.name_decided(
-      *rival, {.confirmed = false, .holder = NodeId{9}, .sentence = "it was first"}, 1s, effects_);
-  EXPECT_EQ(rival->name, "") << "it goes on, by its id";
-  EXPECT_FALSE(membership_.directory().find("rival"));
-  const auto& lost = std::get<NameDecided>(effects_.back());
-  EXPECT_FALSE(lost.confirmed);
-  EXPECT_EQ(lost.name, "rival");
-  EXPECT_EQ(lost.holder, NodeId{9});
 }
 
 }  // namespace

@@ -28,7 +28,7 @@ struct LinkRig {
   LinkRig(std::uint16_t id, LinksOptions options, std::uint64_t instance = 0)
       : facts(facts_of(id, instance)),
         links(std::move(options),
-              {facts, limits, shards, slots, routes,
+              {facts, limits, shards, slots, routes, names,
                [this](LinkNumber link, const DialledLink&, const proto::Hello& hello) {
                  dialled.push_back({link, hello});
                },
@@ -99,6 +99,9 @@ struct LinkRig {
   FakeShards shards{1};
   SlotPool slots{1};
   RouteTable routes;
+  Membership membership{Sessions::Options{facts.id, 1, Placement::spread}, limits};
+  Watches watches{HubTitle{facts.id, facts.name}, 1, limits};
+  NetworkNames names{{facts, limits, membership, watches}};
   std::vector<Dialled> dialled;
   std::chrono::milliseconds now{10'000};
   std::int64_t clock_ahead_ns = 0;

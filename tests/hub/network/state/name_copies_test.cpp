@@ -41,7 +41,7 @@ TEST_F(NameCopiesTest, TakesWhatFollowsWhatItHas) {
   EXPECT_EQ(copies_.take(names(0, 2, {{"a", node_claim(2, 1, 1)}, {"b", node_claim(2, 2, 2)}})),
             NameCopies::Taken::changed);
   EXPECT_EQ(copies_.find("b")->claim->node, (make_id<NodeId>(kThere, 2)));
-  EXPECT_EQ(copies_.find("b")->standing, Standing::held);
+  EXPECT_EQ(copies_.find("b")->standing, proto::ns::NameStanding::held);
   EXPECT_EQ(copies_.known(kThere)->version, 2u);
   EXPECT_EQ(copies_.take(names(3, 4, {{"d", node_claim(2, 4, 4)}})), NameCopies::Taken::known)
       << "there is a gap";
@@ -102,7 +102,7 @@ TEST_F(NameCopiesTest, SendsAllOnceMarksAreForgotten) {
 TEST_F(NameCopiesTest, KeepsTheNamesOfAHubThatIsAwayForTheGraceTime) {
   (void)copies_.take(names(0, 1, {{"a", node_claim(2, 1, 1)}}));
   (void)copies_.set_reachable({}, milliseconds(1'000));
-  EXPECT_EQ(copies_.find("a")->standing, Standing::unreachable);
+  EXPECT_EQ(copies_.find("a")->standing, proto::ns::NameStanding::unreachable);
   EXPECT_EQ(copies_.find("a")->until, milliseconds(1'000) + kGrace);
   EXPECT_FALSE(copies_.known(kThere));
   NamesPosition at{kFirst, 0, 0};
@@ -110,7 +110,7 @@ TEST_F(NameCopiesTest, KeepsTheNamesOfAHubThatIsAwayForTheGraceTime) {
   EXPECT_EQ(copies_.next_due(), milliseconds(1'000) + kGrace);
   EXPECT_FALSE(copies_.forget(milliseconds(999) + kGrace));
   EXPECT_EQ(copies_.set_reachable(runs(), milliseconds(2'000)), std::vector<HubId>{kThere});
-  EXPECT_EQ(copies_.find("a")->standing, Standing::held);
+  EXPECT_EQ(copies_.find("a")->standing, proto::ns::NameStanding::held);
   (void)copies_.set_reachable({}, milliseconds(3'000));
   EXPECT_TRUE(copies_.forget(milliseconds(3'000) + kGrace));
   EXPECT_FALSE(copies_.find("a"));
@@ -121,13 +121,13 @@ TEST_F(NameCopiesTest, NeverMixesTwoProcessesOfAHub) {
   (void)copies_.take(names(0, 2, {{"a", node_claim(2, 1, 1)}, {"b", node_claim(2, 2, 2)}}));
   (void)copies_.set_reachable(runs(kSecond), milliseconds(1'000));
   EXPECT_EQ(copies_.known(kThere)->version, 0u);
-  EXPECT_EQ(copies_.find("a")->standing, Standing::unreachable);
+  EXPECT_EQ(copies_.find("a")->standing, proto::ns::NameStanding::unreachable);
   EXPECT_EQ(copies_.take(names(0, 3, {{"c", node_claim(2, 3, 3)}})), NameCopies::Taken::known);
   Names after = names(0, 1, {{"a", node_claim(2, 1, 1)}});
   after.instance = kSecond;
   EXPECT_EQ(copies_.take(after), NameCopies::Taken::changed);
-  EXPECT_EQ(copies_.find("a")->standing, Standing::held);
-  EXPECT_EQ(copies_.find("b")->standing, Standing::unreachable);
+  EXPECT_EQ(copies_.find("a")->standing, proto::ns::NameStanding::held);
+  EXPECT_EQ(copies_.find("b")->standing, proto::ns::NameStanding::unreachable);
   EXPECT_TRUE(copies_.forget(milliseconds(1'000) + kGrace));
   EXPECT_FALSE(copies_.find("b"));
   EXPECT_TRUE(copies_.find("a"));

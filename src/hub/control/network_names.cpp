@@ -1,0 +1,127 @@
+#include "hub/control/network_names.hpp"
+
+#include <utility>
+
+#include "base/id_text.hpp"
+#include "base/log.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+namespace route = proto::route;
+using proto::ns::ChangeKind;
+using std::chrono::milliseconds;
+
+}  // namespace
+
+void NetworkNames::begin_connection(LinkNumber number, milliseconds now) {
+  if (!exchange_) begin();
+  exchange_->begin_connection(number, now);
+}
+
+void NetworkNames::begin() {
+  exchange_.emplace(NameCopies::Options{{parts_.facts.id, parts_.facts.instance},
+                                        milliseconds{parts_.limits.grace_ms}});
+  for (const auto& [index, session] : parts_.membership.sessions().all()) put(session);
+  for (const auto& [group, topic] : parts_.membership.services().groups()) put(*topic);
+  parts_.membership.join_network(exchange_->copies());
+  parts_.watches.join_network(exchange_->copies());
+}
+
+void NetworkNames::put(const Session& session) {
+  // One that is being admitted is told of when it is attached.
+  if (session.name.empty() || session.attachment == 0) return;
+  route::NameClaim claim;
+  claim.node = make_id(parts_.facts.id, session.index);
+  claim.state = session.connected ? route::NameState::held : route::NameState::away;
+  exchange_->put_own(session.name.str(), claim);
+}
+
+void NetworkNames::put(const Topic& topic) {
+  if (!topic.provided()) return;
+  const ServiceTerms& terms = topic.service->terms;
+  const Session* provider = parts_.membership.sessions().find(topic.service->provider);
+  route::NameClaim claim;
+  claim.node = make_id(parts_.facts.id, topic.service->provider);
+  claim.service.emplace();
+  claim.service->group = make_id(parts_.facts.id, topic.service->group);
+  claim.service->session = provider == nullptr ? 0 : provider->number;
+  claim.service->message_type = terms.message_type;
+  claim.service->instance = terms.instance;
+  claim.service->window = terms.window;
+  claim.service->direction = terms.direction;
+  claim.service->delivery = terms.delivery;
+  claim.service->retain = terms.retain;
+  exchange_->put_own(topic.full_name, claim);
+}
+
+void NetworkNames::note(const NodeNoted& noted) {
+  if (!exchange_) return;
+  if (!noted.former_name.empty()) exchange_->remove_own(noted.former_name);
+  if (noted.kind == ChangeKind::left) {
+    if (!noted.name.empty()) exchange_->remove_own(noted.name);
+  } else if (const Session* session = parts_.membership.sessions().find(noted.index)) {
+    put(*session);
+  }
+}
+
+void NetworkNames::note(const ServiceNoted& noted) {
+  if (!exchange_) return;
+  if (noted.kind == ChangeKind::withdrawn) {
+    exchange_->remove_own(noted.full_name);
+  } else if (const Topic* topic = parts_.membership.services().find_group(noted.group)) {
+    put(*topic);
+  }
+}
+
+void NetworkNames::take(LinkNumber number, std::span<const std::byte> payload, milliseconds now) {
+  if (exchange_) exchange_->take(number, payload, now);
+}
+
+void NetworkNames::end_link(LinkNumber number) {
+  if (exchange_) exchange_->end_link(number);
+}
+
+void NetworkNames::set_reachable(const NetworkMap& map, const RecordStore& store,
+                                 milliseconds now) {
+  if (exchange_) exchange_->set_reachable(map, store, now);
+}
+
+std::vector<Sending> NetworkNames::take_sendings(milliseconds now) {
+  if (!exchange_) return {};
+  exchange_->advance(now);
+  return exchange_->take_sendings();
+}
+
+std::optional<milliseconds> NetworkNames::next_due() const {
+  return exchange_ ? exchange_->next_due() : std::nullopt;
+}
+
+void NetworkNames::settle(milliseconds now, Effects& effects) {
+  if (!exchange_) return;
+  // The look-ups are valid until a name changes: the effects say so only later.
+  for (const KnownName& winner : exchange_->take_lost()) let_go(winner, now, effects);
+  for (const NameChange& change : exchange_->take_changes()) {
+    const bool service =
+        (change.before && change.before->service) || (change.after && change.after->service);
+    if (service) parts_.membership.services().note_moved(change.name, effects);
+    parts_.watches.note(change);
+  }
+  if (std::exchange(dropped_copies_, exchange_->copies().dropped_copies()) !=
+      exchange_->copies().dropped_copies()) {
+    parts_.membership.services().note_all_moved(effects);
+    parts_.watches.begin_again();
+  }
+}
+
+void NetworkNames::let_go(const KnownName& winner, milliseconds now, Effects& effects) {
+  const std::string name{winner.name};
+  const std::string sentence = "node " + to_string(winner.claim->node) + " of hub " +
+                               std::to_string(winner.hub.value()) +
+                               " has the name and the better claim to it, from a time when the "
+                               "hubs were not connected; choose another name";
+  log_warning("this hub lets go of the name '" + name + "': " + sentence);
+  parts_.membership.lose_name(name, winner.claim->node, sentence, now, effects);
+}
+
+}  // namespace gimnet::hub

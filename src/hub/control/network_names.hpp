@@ -1,0 +1,72 @@
+#pragma once
+
+#include <chrono>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "hub/control/hub_facts.hpp"
+#include "hub/control/state/effects.hpp"
+#include "hub/control/state/membership.hpp"
+#include "hub/control/state/watches.hpp"
+#include "hub/limits.hpp"
+#include "hub/network/state/name_exchange.hpp"
+
+namespace gimnet::hub {
+
+/// The names of the whole network at this hub: tells the other hubs what this one has, and its own
+/// nodes what the others have. A hub that never had a link keeps no names twice: all begins with
+/// the first connection. Thread safety: the conductor's thread only. Lifetime: its parts outlive
+/// it.
+class NetworkNames {
+ public:
+  struct Parts {
+    const HubFacts& facts;
+    const Limits& limits;
+    Membership& membership;
+    Watches& watches;
+  };
+  explicit NetworkNames(const Parts& parts) : parts_(parts) {}
+
+  // For the links: see NameExchange
+
+  void begin_connection(LinkNumber number, std::chrono::milliseconds now);
+  void take(LinkNumber number, std::span<const std::byte> payload, std::chrono::milliseconds now);
+  void end_link(LinkNumber number);
+  /// To be called when the map was computed anew.
+  void set_reachable(const NetworkMap& map, const RecordStore& store,
+                     std::chrono::milliseconds now);
+  [[nodiscard]] std::vector<Sending> take_sendings(std::chrono::milliseconds now);
+  [[nodiscard]] std::optional<std::chrono::milliseconds> next_due() const;
+
+  // For the rest of the conductor
+
+  /// This hub's own names change. REQUIRES: the effects before it were noted.
+  void note(const NodeNoted& noted);
+  void note(const ServiceNoted& noted);
+  /// Lets go of names that were lost, and tells own nodes what changed elsewhere.
+  void settle(std::chrono::milliseconds now, Effects& effects);
+
+  /// Null: the hub has had no link yet.
+  [[nodiscard]] const NameCopies* copies() const {
+    return exchange_ ? &exchange_->copies() : nullptr;
+  }
+  /// Names may be missing, since a link came up a moment ago.
+  [[nodiscard]] bool is_learning(std::chrono::milliseconds now) const {
+    return exchange_ && exchange_->is_learning(now);
+  }
+
+ private:
+  void begin();
+  void put(const Session& session);
+  void put(const Topic& topic);
+  void let_go(const KnownName& winner, std::chrono::milliseconds now, Effects& effects);
+
+  const Parts parts_;
+  std::optional<NameExchange> exchange_;
+  std::uint64_t dropped_copies_ = 0;  ///< that those who watch were told of
+};
+
+}  // namespace gimnet::hub

@@ -1,0 +1,81 @@
+#include "base/id_text.hpp"
+#include "hub/control/state/membership.hpp"
+
+// Names of this hub beside those of services and of other hubs.
+
+namespace gimnet::hub {
+namespace {
+
+using proto::GoodbyeCode;
+using std::chrono::milliseconds;
+
+std::string quoted(std::string_view name) { return "the name '" + std::string{name} + "' "; }
+
+proto::Goodbye taken(std::string sentence) {
+  return {GoodbyeCode::name_taken, std::move(sentence) + "; choose another name"};
+}
+
+std::string holder_of(const KnownName& known) {
+  return "node " + to_string(known.claim->node) + " of hub " + std::to_string(known.hub.value());
+}
+
+}  // namespace
+
+std::optional<proto::Goodbye> Membership::name_refusal(std::string_view name,
+                                                       const Session* claimant,
+                                                       milliseconds now) const {
+  if (auto refusal = directory_.refusal(name, claimant, sessions_, now)) return refusal;
+  if (claimant != nullptr && claimant->name == name) return std::nullopt;
+  return network_refusal(name, now);
+}
+
+std::optional<proto::Goodbye> Membership::network_refusal(std::string_view name,
+                                                          milliseconds now) const {
+  if (const Topic* topic = services_.find(name); topic != nullptr && topic->provided())
+    return taken(quoted(name) + "is the full name of a service");
+  if (names_ == nullptr) return std::nullopt;
+  const auto known = names_->find(name);
+  if (!known && names_->is_full()) {
+    return proto::Goodbye{GoodbyeCode::hub_full,
+                          "the names of all hubs together are as many as this hub has room for; go "
+                          "on without a name, or try again later"};
+  }
+  if (!known || known->hub == names_->self().hub) return std::nullopt;
+  if (known->claim->service)
+    return taken(quoted(name) + "is the full name of a service of " + holder_of(*known));
+  if (known->standing == proto::ns::NameStanding::held)
+    return taken(quoted(name) + "is held by " + holder_of(*known));
+  if (known->standing == proto::ns::NameStanding::away) return std::nullopt;
+  const auto left = std::max<std::int64_t>(1, (known->until - now).count() / 1'000);
+  return taken(quoted(name) + "is that of " + holder_of(*known) +
+               ", which cannot be reached; it is free in " + std::to_string(left) +
+               " s, unless that hub comes back: wait");
+}
+
+std::optional<proto::Refusal> Membership::service_name_refusal(std::string_view full_name) const {
+  std::string holder;
+  if (const auto index = directory_.find(full_name)) {
+    holder = "node " + to_string(sessions_.node_id(*sessions_.find(*index)));
+  } else if (const auto known = names_ == nullptr ? std::nullopt : names_->find(full_name);
+             known && !known->claim->service) {
+    holder = holder_of(*known);
+  }
+  if (holder.empty()) return std::nullopt;
+  return proto::Refusal{proto::Status::taken, "the full name of the service, '" +
+                                                  std::string{full_name} + "', is the name of " +
+                                                  holder + "; choose another name"};
+}
+
+void Membership::lose_name(const std::string& name, NodeId holder, const std::string& sentence,
+                           milliseconds now, Effects& effects) {
+  if (const auto index = directory_.find(name)) {
+    take_name(*sessions_.find(*index), "", now, effects);
+    effects.emplace_back(NameLost{*index, name, holder, sentence});
+  } else if (const Topic* topic = services_.find(name); topic != nullptr && topic->provided()) {
+    const NodeIndex provider = topic->service->provider;
+    if (!services_.withdraw(provider, topic->service->group, now, effects))
+      effects.emplace_back(NameLost{provider, name, holder, sentence});
+  }
+}
+
+}  // namespace gimnet::hub

@@ -1,0 +1,289 @@
+#include "hub/control/network_names.hpp"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "base/log.hpp"
+#include "hub/control/handle/names.hpp"
+#include "hub/control/handle/services.hpp"
+#include "hub/control/handle/watch.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using namespace std::chrono_literals;
+using proto::Status;
+using std::chrono::milliseconds;
+namespace ns = proto::ns;
+
+constexpr LinkNumber kLink{1};
+
+ns::Watch watch_of_all() {
+  ns::Watch watch;
+  watch.watch = 1;
+  return watch;
+}
+
+/// A hub's control plane without its conductor.
+class Side {
+ public:
+  explicit Side(std::uint16_t hub)
+      : membership(Sessions::Options{HubId{hub}, 1, Placement::spread}, limits),
+        watches(HubTitle{HubId{hub}, "hub"}, 1, limits) {
+    facts.id = HubId{hub};
+    facts.instance = proto::HubInstance{hub};
+    limits.page_records = 2;
+  }
+  Session& join(const std::string& name) {
+    JoinRequest request;
+    request.name = name;
+    request.identity = Identity::open();
+    Effects effects;
+    Session* session = membership.join(request, now, effects)->session;
+    carry_out(effects);
+    return *session;
+  }
+  void advertise(const Session& session, const std::string& full_name) {
+    Effects effects;
+    ASSERT_TRUE(membership.services().advertise(session.index, full_name, {}, now, effects));
+    carry_out(effects);
+  }
+  /// As EffectRunner does.
+  void carry_out(const Effects& effects) {
+    for (const Effect& effect : effects) {
+      if (const auto* node = std::get_if<NodeNoted>(&effect)) {
+        watches.note(*node, membership, now);
+        names.note(*node);
+      } else if (const auto* service = std::get_if<ServiceNoted>(&effect)) {
+        watches.note(*service, membership, now);
+        names.note(*service);
+      } else if (const auto* lost = std::get_if<NameLost>(&effect)) {
+        lost_names.push_back(lost->name);
+      } else if (const auto* moved = std::get_if<ServiceMoved>(&effect)) {
+        moved_services.push_back(moved->full_name);
+      }
+    }
+  }
+  template <class Answer, class Asked>
+  Result<Answer, proto::Refusal> ask(Handler handle, const Session& session, const Asked& asked,
+                                     bool own_only = false) {
+    Effects effects;
+    HandlerContext context{facts, limits, membership, watches, {}, now, effects};
+    context.names = &names;
+    const proto::Payload payload = proto::encode(asked, 1);
+    const auto answer = handle(context, {session, {Asked::kOperation, 1}, payload, own_only});
+    carry_out(effects);
+    return proto::decode_answer<Answer>(answer);
+  }
+  std::vector<std::string> watched() {
+    std::vector<std::string> told;
+    while (watches.serve(membership, now, [&](NodeIndex, const proto::Payload& bytes) {
+      const auto events = proto::decode<ns::WatchEvents>(bytes);
+      for (const ns::Change& change : events->changes) {
+        const std::string kind = std::to_string(static_cast<int>(change.kind));
+        if (change.node) told.push_back(kind + " " + change.node->name);
+        if (change.service) told.push_back(kind + " " + change.service->name);
+      }
+    })) {
+    }
+    return told;
+  }
+
+  milliseconds now{10'000};
+  HubFacts facts;
+  Limits limits;
+  Membership membership;
+  Watches watches;
+  NetworkNames names{{facts, limits, membership, watches}};
+  std::vector<std::string> lost_names;
+  std::vector<std::string> moved_services;
+};
+
+class NetworkNamesTest : public ::testing::Test {
+ protected:
+  NetworkNamesTest() { set_log_level(LogLevel::off); }
+  ~NetworkNamesTest() override { set_log_level(LogLevel::info); }
+  void connect() {
+    here_.names.begin_connection(kLink, here_.now);
+    there_.names.begin_connection(kLink, there_.now);
+    reach(here_, there_);
+    reach(there_, here_);
+    settle();
+  }
+  static void reach(Side& from, const Side& to) {
+    HubIdentity self{{from.facts.id, {}}, from.facts.instance};
+    HubIdentity other{{to.facts.id, {}}, to.facts.instance};
+    RecordStore store;
+    for (const auto& [hub, neighbour] : {std::pair(self, other), std::pair(other, self)}) {
+      proto::route::RecordPart part;
+      part.hub = hub.key;
+      part.instance = hub.instance;
+      part.sequence = 1;
+      part.name = "far";
+      part.neighbours = {{neighbour.key, 1}};
+      (void)store.take(make_part(part), from.now);
+    }
+    const std::vector<CarryingLink> links{{{other.key, 1}, kLink}};
+    from.names.set_reachable(NetworkMap(self, store, links), store, from.now);
+  }
+  /// Until nothing is sent any more.
+  void settle() {
+    for (bool more = true; more;) {
+      more = false;
+      for (auto [from, to] : {std::pair(&here_, &there_), std::pair(&there_, &here_)}) {
+        for (const Sending& each : from->names.take_sendings(from->now)) {
+          to->names.take(kLink, *each.bytes, to->now);
+          more = true;
+        }
+      }
+      for (Side* side : {&here_, &there_}) {
+        Effects effects;
+        side->names.settle(side->now, effects);
+        side->carry_out(effects);
+      }
+    }
+  }
+  Side here_{5};
+  Side there_{9};
+};
+
+TEST_F(NetworkNamesTest, AnotherHubsNodesAreResolvedAndReversed) {
+  const Session& asker = here_.join("asker");
+  const Session& robot = there_.join("robot");
+  const NodeId id = make_id(HubId{9}, robot.index);
+  const auto alone = here_.ask<ns::ResolveAnswer>(handle_resolve, asker, ns::Resolve{"robot"});
+  EXPECT_EQ(alone.error().status, Status::not_found);
+  EXPECT_FALSE(alone.error().learning);
+  connect();
+  const auto found = here_.ask<ns::ResolveAnswer>(handle_resolve, asker, ns::Resolve{"robot"});
+  ASSERT_TRUE(found);
+  EXPECT_EQ(*found, (ns::ResolveAnswer{id, ns::NameStanding::held, true}));
+  EXPECT_TRUE(
+      here_.ask<ns::ResolveAnswer>(handle_resolve, asker, ns::Resolve{"nobody"}).error().learning);
+  here_.now += NameExchange::kLearning;
+  EXPECT_FALSE(here_.ask<ns::ResolveAnswer>(handle_resolve, asker, ns::Resolve{"robot"})->learning);
+  EXPECT_EQ(here_.ask<ns::ReverseAnswer>(handle_reverse, asker, ns::Reverse{id})->name, "robot");
+  EXPECT_FALSE(here_.ask<ns::ResolveAnswer>(handle_resolve, asker, ns::Resolve{"robot"}, true))
+      << "of this hub's own names";
+}
+
+TEST_F(NetworkNamesTest, ANodeThatIsAwayOrUnreachableIsSaidToBe) {
+  const Session& asker = here_.join("asker");
+  Session& robot = there_.join("robot");
+  connect();
+  Effects effects;
+  there_.membership.connection_ended(robot, {}, there_.now, effects);
+  there_.carry_out(effects);
+  settle();
+  const auto standing = [&] {
+    return here_.ask<ns::ResolveAnswer>(handle_resolve, asker, ns::Resolve{"robot"})->standing;
+  };
+  EXPECT_EQ(standing(), ns::NameStanding::away);
+  here_.names.set_reachable(NetworkMap(HubIdentity{}), RecordStore{}, here_.now);
+  EXPECT_EQ(standing(), ns::NameStanding::unreachable);
+}
+
+TEST_F(NetworkNamesTest, ListsGoThroughAllHubsInPages) {
+  const Session& asker = here_.join("a");
+  const Session& last = here_.join("b");
+  const Session& robot = there_.join("robot/1");
+  there_.join("robot/2");
+  here_.advertise(last, "b/odom");
+  there_.advertise(robot, "robot/1/odom");
+  connect();
+  for (Side* side : {&here_, &there_}) {
+    std::vector<std::string> names;
+    ns::List wanted;
+    for (bool more = true; more;) {
+      const auto page = side->ask<ns::ListAnswer>(handle_list, asker, wanted);
+      ASSERT_TRUE(page);
+      EXPECT_LE(page->nodes.size(), 2u);
+      for (const ns::NodeRecord& each : page->nodes) names.push_back(each.name);
+      more = page->more;
+      wanted.after = page->next;
+    }
+    EXPECT_EQ(names, (std::vector<std::string>{"a", "b", "robot/1", "robot/2"}));
+    const auto services = side->ask<ns::ServicesAnswer>(handle_services, asker, ns::Services{});
+    ASSERT_TRUE(services);
+    ASSERT_EQ(services->services.size(), 2u);
+    EXPECT_EQ(services->services[1].name, "robot/1/odom");
+  }
+  ns::List of_robots;
+  of_robots.pattern = "robot/*";
+  const auto found = here_.ask<ns::ListAnswer>(handle_list, asker, of_robots);
+  ASSERT_EQ(found->nodes.size(), 2u);
+  EXPECT_EQ(found->nodes[0].hub, HubId{9});
+  EXPECT_EQ(found->nodes[0].hub_name, "far");
+  EXPECT_EQ(here_.ask<ns::ListAnswer>(handle_list, asker, ns::List{}, true)->nodes.size(), 2u);
+}
+
+TEST_F(NetworkNamesTest, ASubscriberHearsOfAServiceOfAnotherHub) {
+  const Session& asker = here_.join("asker");
+  Session& robot = there_.join("robot");
+  connect();
+  const auto before =
+      here_.ask<ns::SubscribeAnswer>(handle_subscribe, asker, ns::Subscribe{.name = "robot/odom"});
+  ASSERT_TRUE(before);
+  EXPECT_EQ(before->provider, NodeId{});
+  here_.moved_services.clear();
+  there_.advertise(robot, "robot/odom");
+  settle();
+  EXPECT_EQ(here_.moved_services, std::vector<std::string>{"robot/odom"});
+  const auto after =
+      here_.ask<ns::SubscribeAnswer>(handle_subscribe, asker, ns::Subscribe{.name = "robot/odom"});
+  EXPECT_EQ(after->provider, make_id(HubId{9}, robot.index));
+  EXPECT_EQ(hub_of(after->group), HubId{9});
+}
+
+TEST_F(NetworkNamesTest, OfTwoHoldersOneLosesItsName) {
+  here_.join("robot");
+  Session& loser = there_.join("robot");
+  connect();
+  EXPECT_TRUE(here_.lost_names.empty());
+  EXPECT_EQ(there_.lost_names, std::vector<std::string>{"robot"});
+  EXPECT_EQ(loser.name, "");
+  EXPECT_EQ(there_.names.copies()->find("robot")->hub, HubId{5});
+}
+
+TEST_F(NetworkNamesTest, WatchersAreToldOfAllHubs) {
+  const Session& asker = here_.join("asker");
+  Session& robot = there_.join("robot");
+  connect();
+  ASSERT_TRUE(here_.ask<ns::WatchAnswer>(handle_watch, asker, watch_of_all()));
+  EXPECT_EQ(here_.watched(), (std::vector<std::string>{"1 asker", "1 robot"}));
+  there_.advertise(robot, "robot/odom");
+  settle();
+  EXPECT_EQ(here_.watched(), std::vector<std::string>{"9 robot/odom"});
+  Effects effects;
+  there_.membership.connection_ended(robot, {true, proto::GoodbyeCode::done, ""}, there_.now,
+                                     effects);
+  there_.carry_out(effects);
+  settle();
+  EXPECT_EQ(here_.watched(), (std::vector<std::string>{"10 robot/odom", "4 robot"}));
+}
+
+TEST_F(NetworkNamesTest, WatchersBeginAgainWhenAHubIsForgotten) {
+  const Session& asker = here_.join("asker");
+  there_.join("robot");
+  connect();
+  ASSERT_TRUE(here_.ask<ns::WatchAnswer>(handle_watch, asker, watch_of_all()));
+  (void)here_.watched();
+  here_.names.set_reachable(NetworkMap(HubIdentity{}), RecordStore{}, here_.now);
+  here_.now += milliseconds(here_.limits.grace_ms);
+  EXPECT_LE(*here_.names.next_due(), here_.now);
+  (void)here_.names.take_sendings(here_.now);
+  settle();
+  EXPECT_EQ(here_.watched(), std::vector<std::string>{"1 asker"});
+}
+
+TEST_F(NetworkNamesTest, AHubThatHasHadNoLinkKeepsNoCopies) {
+  here_.join("robot");
+  EXPECT_EQ(here_.names.copies(), nullptr);
+  EXPECT_FALSE(here_.names.next_due());
+  connect();
+  EXPECT_EQ(here_.names.copies()->size(), 1u);
+}
+
+}  // namespace
+}  // namespace gimnet::hub

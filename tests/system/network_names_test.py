@@ -1,0 +1,91 @@
+#!/usr/bin/env python3
+"""Names across linked hubs: three in a chain, and strangers at its ends."""
+
+import time
+import unittest
+
+from stranger_parts.bitestream import TEXT, U32, U8, every, fields, put
+from stranger_parts.case import PATIENT, Case
+from stranger_parts.client import NS, UNICAST, Denied, Refused
+from support.waiting import wait_until
+
+
+class NetworkNames(Case):
+    def setUp(self):
+        self.first = self.hub("--accept-links", *PATIENT, hub_id=1)
+        middle = self.hub("--accept-links", "--link", self.first.url, *PATIENT, hub_id=2)
+        self.last = self.hub("--link", middle.url, *PATIENT, hub_id=3)
+
+    def found(self, who, name):
+        """The id of a name, as soon as it is known there."""
+
+        def ask():
+            try:
+                return who.resolve(name)
+            except Denied:
+                return None
+
+        return wait_until(ask, f"{name} is known")
+
+    def test_a_node_at_one_end_is_found_and_reached_from_the_other(self):
+        robot = self.stranger(self.first, "robot")
+        viewer = self.stranger(self.last, "viewer")
+        self.assertEqual(self.found(viewer, "robot"), robot.id)
+        self.assertEqual(fields(viewer.ask(NS, 4, put(3, U32, robot.id)))[3], "robot")
+        viewer.write(UNICAST, robot.id, b"hello")
+        got = robot.data()
+        self.assertEqual((got.src, got.body), (viewer.id, b"hello"))
+
+    def test_a_new_name_is_known_soon_and_one_that_was_given_back_is_not(self):
+        viewer = self.stranger(self.last, "viewer")
+        self.found(self.stranger(self.first, "early"), "viewer")
+        began = time.monotonic()
+        robot = self.stranger(self.first, "robot")
+        self.found(viewer, "robot")
+        self.assertLess(time.monotonic() - began, 2.0)
+        robot.leave()
+
+        def is_gone():
+            try:
+                viewer.resolve("robot")
+            except Denied as denied:
+                return denied.args[0] == 3
+            return False
+
+        wait_until(is_gone, "robot is gone")
+
+    def test_a_name_that_another_hub_holds_is_refused_with_its_holder(self):
+        robot = self.stranger(self.first, "robot")
+        viewer = self.stranger(self.last, "viewer")
+        self.found(viewer, "robot")
+        with self.assertRaises(Refused) as refused:
+            self.stranger(self.last, "robot")
+        self.assertEqual(refused.exception.args[0], 4)
+        self.assertIn(f"node 1.{robot.id & 0xFFFFF} of hub 1", refused.exception.args[1])
+        with self.assertRaises(Denied) as denied:
+            viewer.ask(NS, 1, put(3, TEXT, "robot"))
+        self.assertEqual(denied.exception.args[0], 4)
+
+    def test_lists_and_watches_show_all_hubs(self):
+        robot = self.stranger(self.first, "robot")
+        viewer = self.stranger(self.last, "viewer")
+        self.found(viewer, "robot")
+        nodes = [fields(node) for node in every(viewer.ask(NS, 5), 3)]
+        self.assertEqual([(node[1], node[2], node[3]) for node in nodes],
+                         [(robot.id, "robot", 1), (viewer.id, "viewer", 3)])
+        viewer.ask(NS, 6, put(3, U32, 1) + put(5, U8, 2))
+        group = robot.advertise("scan")[3]
+        seen = []
+        while (group, "robot/scan") not in seen:
+            events = viewer.wait(lambda got: got.kind == NS and got.body[:4] == b"\x25\0\0\0").body[4:]
+            viewer.ask(NS, 13, put(3, U32, 1) + put(4, U32, 1))
+            for change in every(events, 3):
+                service = fields(fields(change).get(5) or [])
+                seen.append((service.get(1), service.get(2)))
+        services = [fields(service) for service in every(viewer.ask(NS, 9), 3)]
+        self.assertEqual([(service[1], service[2], service[3]) for service in services], [(group, "robot/scan", robot.id)])
+        self.assertEqual(viewer.subscribe("robot/scan")[4], group)
+
+
+if __name__ == "__main__":
+    unittest.main()
