@@ -133,6 +133,8 @@ constexpr std::array kTable{
               "advertised by one node", true, true},
     LimitInfo{"subscriptions_per_node", "subscriptions", &Limits::subscriptions_per_node, 0,
               1'000'000, "of one node, names without a service included", true, true},
+    LimitInfo{"told_at_once", "subscribers", &Limits::told_at_once, 1, 1'000'000,
+              "told of services in one piece, before others have their turn"},
     LimitInfo{"sync_window", "messages", &Limits::sync_window, 1, 1'000'000,
               "largest n of a service with delivery sync(n), and largest window of a subscription",
               true},

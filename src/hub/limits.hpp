@@ -68,6 +68,7 @@ struct Limits {
   std::uint64_t oddities_burst = 1'000;
   std::uint64_t services_per_node = 1'024;
   std::uint64_t subscriptions_per_node = 1'024;
+  std::uint64_t told_at_once = 4'096;
   std::uint64_t sync_window = 1'024;
   std::uint64_t subscription_depth = 64;
   std::uint64_t subscription_rate_hz = 1'000;

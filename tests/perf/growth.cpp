@@ -13,6 +13,7 @@
 #include <cstdlib>
 #include <functional>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -228,18 +229,18 @@ Work subscribers(std::size_t count) {
       wrong("a subscription");
   }
   world->publisher.publish_group(GroupIndex{1}, world->membership);
+  world->publisher.publish_members(GroupIndex{1}, std::span{world->subscribers}.subspan(1),
+                                   world->membership);
   world->effects.clear();
   return [world, &services, count] {
     for (std::size_t i = 0; i < count; ++i) {
       // In no order: a step that shares no factor with the number of them.
       const NodeIndex node = world->subscribers[1 + i * 7'919 % count];
       if (services.unsubscribe(node, "robot/odom", {}, world->effects)) wrong("it had subscribed");
-      if (!world->publisher.publish_member(GroupIndex{1}, node, world->membership))
-        wrong("the group is there");
+      world->publisher.publish_members(GroupIndex{1}, {&node, 1}, world->membership);
       if (!services.subscribe(node, "robot/odom", {}, world->effects))
         wrong("a subscription was refused");
-      if (!world->publisher.publish_member(GroupIndex{1}, node, world->membership))
-        wrong("the group is there");
+      world->publisher.publish_members(GroupIndex{1}, {&node, 1}, world->membership);
       world->effects.clear();
     }
   };

@@ -54,7 +54,8 @@ std::string Checks::stale() const {
       count += members->by_shard[i].size();
       if (!members->paced_by_shard.empty()) count += members->paced_by_shard[i].size();
     }
-    if (members == nullptr || count != topic->subscribers.size()) {
+    const bool all_joined = conductor_->tells_later() || count == topic->subscribers.size();
+    if (members == nullptr || !all_joined) {
       return "an answer leaves before the table of groups is right";
     }
   }
@@ -87,7 +88,7 @@ void Checks::after_step(milliseconds now) {
           "the hub is to drain, and no administrator asked for it, or the reverse");
 }
 
-void Checks::events() {
+std::vector<DueEvent> Checks::told_events() const {
   std::vector<DueEvent> told;
   for (const SimShards::Sent& sent : subject_.shards.sent()) {
     const auto* control = std::get_if<hub::SendControlCommand>(sent.command);
@@ -101,22 +102,59 @@ void Checks::events() {
       told.push_back({to, operation, told_subscribers(payload)});
     }
   }
+  std::sort(told.begin(), told.end());
+  told.erase(std::unique(told.begin(), told.end()), told.end());
+  return told;
+}
+
+void Checks::events() {
+  told_again();
+  const std::vector<DueEvent> told = told_events();
   for (const auto& [former, present] : model_.take_renumbered()) {
     if (auto place = places_.extract(former); !place.empty()) {
       place.key() = present;
       places_.insert(std::move(place));
     }
   }
-  std::sort(told.begin(), told.end());
-  told.erase(std::unique(told.begin(), told.end()), told.end());
   const std::vector<DueEvent> due = model_.take_due();
-  for (const DueEvent& event : due) {
-    if (!std::binary_search(told.begin(), told.end(), event))
+  owed_.insert(owed_.end(), due.begin(), due.end());
+  std::sort(owed_.begin(), owed_.end());
+  for (const DueEvent& event : told) {
+    const bool again = tells_later_ && event.operation == ns::ServiceMoved::kOperation;
+    if (!again && !std::binary_search(owed_.begin(), owed_.end(), event))
+      broken(Checker::events, "told for nothing " + text_of(event));
+  }
+  std::erase_if(owed_, [&](const DueEvent& event) {
+    return std::binary_search(told.begin(), told.end(), event) || !may_wait(event);
+  });
+  tells_later_ = conductor_->tells_later();
+  for (const DueEvent& event : owed_) {
+    if (!tells_later_ || event.operation != ns::ServiceMoved::kOperation)
       broken(Checker::events, "not told " + text_of(event));
   }
-  for (const DueEvent& event : told) {
-    if (!std::binary_search(due.begin(), due.end(), event))
-      broken(Checker::events, "told for nothing " + text_of(event));
+}
+
+bool Checks::may_wait(const DueEvent& event) const {
+  if (event.operation != ns::ServiceMoved::kOperation) return true;
+  const Model::Topic* topic = model_.topic(event.name);
+  const auto session = model_.sessions().find(event.to);
+  return topic != nullptr && topic->subscribers.contains(event.to) &&
+         session != model_.sessions().end() && session->second.connected;
+}
+
+void Checks::told_again() const {
+  for (const SimShards::Sent& sent : subject_.shards.sent()) {
+    const auto* again = std::get_if<hub::TellAgainCommand>(sent.command);
+    if (again == nullptr) continue;
+    for (const Bytes& frame : split_frames(again->frames)) {
+      const proto::Payload payload(frame.begin() + proto::kHeaderSize, frame.end());
+      if (proto::split_control(payload)->header.operation == ns::ServiceMoved::kOperation) {
+        static_cast<void>(
+            told_moved(payload, index_of(NodeId{proto::load_header(frame.data()).dst})));
+      } else {
+        static_cast<void>(told_subscribers(payload));
+      }
+    }
   }
 }
 
@@ -218,6 +256,8 @@ bool Checks::is_right(const hub::GroupMembers* members, const Model::Topic* topi
   std::size_t count = 0;
   for (const auto& list : members->by_shard) count += list.size();
   for (const auto& list : members->paced_by_shard) count += list.size();
+  // Those that have yet to be told have yet to join.
+  if (conductor_->tells_later()) return count <= topic->subscribers.size();
   if (count != topic->subscribers.size()) return false;
   return std::all_of(
       topic->subscribers.begin(), topic->subscribers.end(), [&](const auto& subscriber) {
@@ -242,7 +282,7 @@ void Checks::group_table() {
     const hub::GroupMembers* members = subject_.groups.find(group);
     const hub::GroupMembers*& seen = seen_[group];
     if (!whole && seen == members && !touched_.contains(group)) continue;
-    seen = members;
+    seen = conductor_->tells_later() ? nullptr : members;
     if (!is_right(members, &topic->second)) {
       broken(Checker::group_table, "the table is wrong about group " + std::to_string(group) +
                                        ", '" + topic->first + "'");

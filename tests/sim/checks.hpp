@@ -33,6 +33,10 @@ class Checks {
 
  private:
   void events();
+  [[nodiscard]] std::vector<DueEvent> told_events() const;
+  /// Can that wait to be told, or the node have been told otherwise by now?
+  [[nodiscard]] bool may_wait(const DueEvent& event) const;
+  void told_again() const;
   [[nodiscard]] std::string told_moved(const proto::Payload& payload, std::uint32_t to) const;
   [[nodiscard]] std::string told_subscribers(const proto::Payload& payload) const;
   void sessions() const;
@@ -53,9 +57,12 @@ class Checks {
   std::string out_of_order_;
   std::map<std::uint32_t, hub::Place> places_;  ///< of the sessions that shards were given
   std::set<std::uint32_t> touched_;             ///< groups that this step may have changed
+  std::set<std::uint32_t> untold_;              ///< and whose paces were not looked at yet
   /// Groups as they were published when they were right. What is published is never changed.
   std::map<std::uint32_t, const hub::GroupMembers*> seen_;
   std::uint64_t steps_ = 0;
+  std::vector<DueEvent> owed_;  ///< SERVICE_MOVED in pieces that have not come yet; in order
+  bool tells_later_ = false;    ///< before this step
   /// A session, as commands name it.
   struct Seat {
     std::uint8_t shard = 0;

@@ -1,3 +1,5 @@
+#include <utility>
+
 #include "tests/sim/checks.hpp"
 
 // What the shards are told of pace, against what the reference model says that subscribers are
@@ -22,7 +24,10 @@ void Checks::paces() {
       for (auto& [group, told] : paces_) told.erase(seat_of(release->session));
     }
   }
-  for (const std::uint32_t group : touched_) {
+  // Those that have yet to be told are not paced yet.
+  untold_.insert(touched_.begin(), touched_.end());
+  if (conductor_->tells_later()) return;
+  for (const std::uint32_t group : std::exchange(untold_, {})) {
     const auto found = model_.groups().find(group);
     if (found != model_.groups().end()) pace_of(group, found->second->second);
   }

@@ -220,11 +220,12 @@ void HubLife::tick() {
   if (garbage && !conductor_.has_garbage()) setting_.census.add(Happening::garbage_freed);
 }
 
-bool HubLife::serve_watches() {
+bool HubLife::tell_rest() {
   shards_.forget_sent();
-  const bool more = conductor_.serve_watches(setting_.agenda.now_ms());
+  const bool more = conductor_.tell_rest(setting_.agenda.now_ms());
   trace_sent();
   after_step();
+  if (conductor_.tells_later()) setting_.census.add(Happening::told_later);
   return more;
 }
 

@@ -43,8 +43,10 @@ class HubLife {
   void drain();
   [[nodiscard]] bool drains() const { return drains_; }
   /// A piece of what those who watch are to be told. True: there is more.
-  bool serve_watches();
-  [[nodiscard]] bool is_watched() const { return conductor_.watches().size() > 0; }
+  bool tell_rest();
+  [[nodiscard]] bool has_to_tell() const {
+    return conductor_.watches().size() > 0 || conductor_.tells_later();
+  }
 
   [[nodiscard]] hub::Conductor& conductor() { return conductor_; }
   [[nodiscard]] SimShards& shards() { return shards_; }

@@ -136,6 +136,9 @@ void SimNode::require_told(const Link& from, const std::string& full_name,
                            const Known& known) const {
   const auto before = from.before.find(full_name);
   if (before == from.before.end()) return;
+  // The event may wait for its turn, or have been missed.
+  const Plan& plan = around_.setting.plan;
+  if (plan.missed_event != 0 || plan.limits.told_at_once < plan.nodes) return;
   // Declared so late that it may have ended as undeclared, and begun anew.
   const std::chrono::milliseconds grace{around_.setting.plan.limits.grace_ms};
   if (around_.setting.agenda.now() - from.dialled >= grace) return;

@@ -94,6 +94,10 @@ Plan Plan::draw(Random& random, std::size_t nodes) {
   plan.disk_full = sometimes(random, 500);
   plan.hub_kills = random.chance(300) ? random.between(1, 2) : 0;
   plan.hub_drains = random.chance(200) ? random.between(1, 2) : 0;
+  plan.missed_event = sometimes(random, 100);
+  // Half of the worlds tell in the smallest pieces.
+  const std::uint64_t told = random.between(1, 3);
+  if (random.chance(500)) plan.limits.told_at_once = told;
   return plan;
 }
 

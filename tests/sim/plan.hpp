@@ -51,9 +51,10 @@ struct Plan {
   std::uint64_t clog = 0;               ///< of frames: nothing passes the connection for a while
   std::uint64_t shard_pause = 0;        ///< of turns
   std::uint64_t conductor_pause = 0;
-  std::uint64_t disk_full = 0;   ///< of times that the hub keeps its state
-  std::uint64_t hub_kills = 0;   ///< in all
-  std::uint64_t hub_drains = 0;  ///< in all, the one at the end apart
+  std::uint64_t missed_event = 0;  ///< of events: the node's control queue is half full
+  std::uint64_t disk_full = 0;     ///< of times that the hub keeps its state
+  std::uint64_t hub_kills = 0;     ///< in all
+  std::uint64_t hub_drains = 0;    ///< in all, the one at the end apart
 
   [[nodiscard]] static Plan draw(Random& random, std::size_t nodes);
 };
@@ -63,7 +64,7 @@ struct Fault {
   std::string_view name;
   std::uint64_t Plan::* likelihood;
 };
-inline constexpr std::array<Fault, 28> kFaults = {{
+inline constexpr std::array<Fault, 29> kFaults = {{
     {"hub_kills", &Plan::hub_kills},
     {"hub_drains", &Plan::hub_drains},
     {"crash", &Plan::crash},
@@ -87,6 +88,7 @@ inline constexpr std::array<Fault, 28> kFaults = {{
     {"stall", &Plan::stall},
     {"clog", &Plan::clog},
     {"shard_pause", &Plan::shard_pause},
+    {"missed_event", &Plan::missed_event},
     {"conductor_pause", &Plan::conductor_pause},
     {"disk_full", &Plan::disk_full},
     {"nameless", &Plan::nameless},

@@ -25,6 +25,8 @@ void SimShards::begin_pace(std::size_t index, const hub::PaceCommand& command) {
           "a subscription is paced of a session that the shard does not know");
   setting_.trace.note("shard {a} paces group {b} by a window of {c}", index,
                       index_of(command.group), command.terms.window);
+  const bool misses = seat->wire && seat->events != hub::EventState::told;
+  if (misses && command.with_event && find_pace(*seat, command.group) == nullptr) return;
   std::unique_ptr<Pace>& pace = seat->paces[command.group.value()];
   const bool begins = pace == nullptr;
   if (begins) {

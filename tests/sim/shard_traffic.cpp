@@ -312,6 +312,7 @@ void SimShards::flush(std::size_t index, Seat& seat) {
     setting_.trace.mix(seat.control.front());
     parts_.network.to_node(seat.wire, std::move(seat.control.front()));
   }
+  ask_to_be_told(index, seat);
   for (; !seat.data.empty(); seat.data.pop_front()) {
     require(seat.data.front().for_session == seat.wire->session, Checker::right_session,
             "a frame leaves on a connection of another session");

@@ -29,6 +29,16 @@ Bytes link_frame(NodeId to, HubId hub, const proto::Payload& payload) {
   return frame_of(header, payload);
 }
 
+std::vector<Bytes> split_frames(std::span<const std::byte> bytes) {
+  std::vector<Bytes> frames;
+  while (!bytes.empty()) {
+    const std::size_t size = proto::load_header(bytes.data()).frame_size();
+    frames.emplace_back(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size));
+    bytes = bytes.subspan(size);
+  }
+  return frames;
+}
+
 std::uint64_t message_of(const Bytes& frame) {
   return load_le<std::uint64_t>(frame.data() + proto::kHeaderSize);
 }
@@ -40,7 +50,7 @@ void SimShards::send(ShardIndex index, ShardCommand command) {
   if (auto* tell = std::get_if<hub::TellCommand>(&command)) {
     for (const hub::TellCommand::To& to : tell->to) {
       hub::set_destination(tell->frame, to.node);
-      send(index, hub::SendControlCommand{to.session, 0, tell->frame, 0});
+      send(index, hub::SendControlCommand{to.session, 0, tell->frame, 0, {}, true});
     }
     return;
   }
@@ -123,6 +133,8 @@ void SimShards::execute(std::size_t index, ShardCommand& command) {
     attach(index, *attached);
   } else if (const auto* control = std::get_if<hub::SendControlCommand>(&command)) {
     say(index, *control);
+  } else if (const auto* again = std::get_if<hub::TellAgainCommand>(&command)) {
+    tell_again(index, *again);
   } else if (const auto* closing = std::get_if<hub::CloseCommand>(&command)) {
     Seat* seat = find(index, closing->session.slot, closing->session.generation);
     if (seat != nullptr && seat->wire)
@@ -194,17 +206,14 @@ void SimShards::attach(std::size_t index, AttachCommand& command) {
   seat.number = wire->session;
   seat.attachment = command.attachment;
   seat.wire = wire;
+  seat.events = hub::EventState::told;
   seat.waits_when_away = command.resume_wanted;
   wire->attached = true;
   wire->shard = index;
   wire->slot = command.session.slot.value();
   parts_.network.to_node(wire,
                          link_frame(command.node, parts_.hub, proto::encode(command.welcome)));
-  for (std::size_t at = 0; at < command.told.size();) {
-    const std::size_t size = proto::load_header(command.told.data() + at).frame_size();
-    seat.control.emplace_back(command.told.data() + at, command.told.data() + at + size);
-    at += size;
-  }
+  for (Bytes& frame : split_frames(command.told)) seat.control.push_back(std::move(frame));
   if (!command.told.empty()) setting_.census.add(Happening::moves_told_again);
   count_anew(index, seat);
   if (!wire->at_hub.empty() || wire->end_arrived) has_something(*wire);
@@ -220,12 +229,40 @@ void SimShards::say(std::size_t index, const hub::SendControlCommand& command) {
   require(seat->requests >= command.answers, Checker::answers,
           "more answers than requests on a connection");
   seat->requests -= command.answers;
+  if (command.may_drop && misses(*seat)) return ask_to_be_told(index, *seat);
   Pace* begun = command.counts ? find_pace(*seat, command.counts->group) : nullptr;
   seat->control.push_back(command.frame);
   if (begun != nullptr) {
     begin_counts(*seat, *begun, command.counts->number);
     release_held(index, *seat, *begun);
   }
+  want_flush(index, *seat);
+}
+
+bool SimShards::misses(Seat& seat) {
+  if (seat.events != hub::EventState::told) return true;
+  if (!setting_.random.chance(setting_.plan.missed_event)) return false;
+  setting_.census.add(Happening::event_missed);
+  seat.events = hub::EventState::missed;
+  return true;
+}
+
+/// Once its control queue is empty.
+void SimShards::ask_to_be_told(std::size_t index, Seat& seat) {
+  if (seat.events != hub::EventState::missed || !seat.control.empty()) return;
+  seat.events = hub::EventState::asked;
+  push_event(index, {ShardIndex{static_cast<std::uint8_t>(index)},
+                     hub::EventsMissedEvent{seat.session, seat.attachment, seat.node}});
+}
+
+void SimShards::tell_again(std::size_t index, const hub::TellAgainCommand& command) {
+  Seat* seat = find(index, command.session.slot, command.session.generation);
+  if (seat == nullptr || !seat->wire || command.attachment != seat->attachment) return;
+  require(seat->events == hub::EventState::asked, Checker::seam,
+          "a node is told again that missed nothing");
+  setting_.census.add(Happening::missed_told_again);
+  seat->events = hub::EventState::told;
+  for (Bytes& frame : split_frames(command.frames)) seat->control.push_back(std::move(frame));
   want_flush(index, *seat);
 }
 

@@ -14,6 +14,7 @@
 #include "hub/data/fanout/recipient.hpp"
 #include "hub/data/tables/group_table.hpp"
 #include "hub/data/tables/node_table.hpp"
+#include "hub/shard/connection_state.hpp"
 #include "proto/frame/frame_header.hpp"
 #include "tests/sim/checker.hpp"
 #include "tests/sim/network.hpp"
@@ -109,6 +110,7 @@ class SimShards final : public hub::ShardProxy {
     WirePointer wire;
     bool waits_when_away = false;
     std::uint64_t requests = 0;
+    hub::EventState events = hub::EventState::told;
     std::deque<Bytes> control;
     std::deque<Data> data;
     std::map<std::uint32_t, std::unique_ptr<Pace>> paces;  ///< by group
@@ -147,6 +149,10 @@ class SimShards final : public hub::ShardProxy {
   void attach(std::size_t shard, hub::AttachCommand& command);
   Seat& seat_for(std::size_t shard, const hub::AttachCommand& command);
   void say(std::size_t shard, const hub::SendControlCommand& command);
+  /// An event for the seat: is it to be dropped?
+  [[nodiscard]] bool misses(Seat& seat);
+  void ask_to_be_told(std::size_t shard, Seat& seat);
+  void tell_again(std::size_t shard, const hub::TellAgainCommand& command);
   void on_flow(std::size_t shard, Seat& seat, const Bytes& frame);
   void release(std::size_t shard, hub::SessionRef session);
   void drain(std::size_t shard);
@@ -230,6 +236,8 @@ class SimShards final : public hub::ShardProxy {
 
 /// A whole frame; the header's length is filled in.
 [[nodiscard]] Bytes frame_of(proto::FrameHeader header, std::span<const std::byte> payload);
+/// Whole frames that stand one behind the other.
+[[nodiscard]] std::vector<Bytes> split_frames(std::span<const std::byte> bytes);
 /// The number that a message between nodes says: a later one has a larger one.
 [[nodiscard]] std::uint64_t message_of(const Bytes& frame);
 /// A whole LINK frame from the hub.

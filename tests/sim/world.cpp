@@ -119,7 +119,7 @@ void World::stop_hub() {
   newcomers_.clear();
   clock_.reset();
   clock_due_ = false;
-  watches_due_ = false;
+  telling_due_ = false;
 }
 
 void World::start_hub() {
@@ -210,16 +210,16 @@ void World::want_conductor(Time delay) {
 void World::conductor_turn() {
   if (down_) return;
   look_whether_it_stood();
-  enum class Choice { clock, newcomer, event, watches };
+  enum class Choice { clock, newcomer, event, telling };
   std::vector<Choice> choices;
   const std::vector<std::size_t> shards = life_->shards().with_events();
   if (clock_due_) choices.push_back(Choice::clock);
   if (!newcomers_.empty()) choices.push_back(Choice::newcomer);
   if (!shards.empty()) choices.push_back(Choice::event);
-  if (watches_due_) choices.push_back(Choice::watches);
+  if (telling_due_) choices.push_back(Choice::telling);
   if (choices.empty()) return;
   ++steps_;
-  bool more_watching = life_->is_watched();
+  bool more_to_tell = life_->has_to_tell();
   switch (setting_.random.pick(choices)) {
     case Choice::clock:
       clock_due_ = false;
@@ -233,15 +233,15 @@ void World::conductor_turn() {
       life_->take_event(setting_.random.pick(shards));
       look_at_drain();
       if (down_) return;
-      more_watching = life_->is_watched();
+      more_to_tell = life_->has_to_tell();
       break;
-    case Choice::watches:
-      more_watching = life_->serve_watches();
+    case Choice::telling:
+      more_to_tell = life_->tell_rest();
       break;
   }
-  watches_due_ = more_watching;
+  telling_due_ = more_to_tell;
   arm_clock();
-  if (choices.size() > 1 || watches_due_ || !newcomers_.empty() ||
+  if (choices.size() > 1 || telling_due_ || !newcomers_.empty() ||
       !life_->shards().with_events().empty())
     want_conductor(Time{0});
 }

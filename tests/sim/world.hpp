@@ -81,7 +81,7 @@ class World {
   std::deque<HubLife::Newcomer> newcomers_;
   bool turn_due_ = false;
   bool clock_due_ = false;
-  bool watches_due_ = false;
+  bool telling_due_ = false;
   std::optional<Time> clock_;  ///< when the conductor wants to look at it
   bool down_ = false;          ///< no hub is there
   bool last_life_ = false;     ///< it drains, and is not started again

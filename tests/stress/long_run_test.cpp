@@ -112,7 +112,7 @@ class LongRun : public ::testing::Test {
   /// What the shards and those who watch do at once.
   void settle() {
     for (bool again = true; again;) {
-      again = hub_.conductor.serve_watches(hub_.now);
+      again = hub_.conductor.tell_rest(hub_.now);
       auto sent = std::exchange(hub_.shards.sent, {});
       for (const FakeShards::Sent& each : sent) again = react(each) || again;
       hub_.kept.clear();

@@ -72,7 +72,8 @@ Conductor::Conductor(HubFacts facts, Placement placement, Limits& limits, Wiring
       publisher_(facts_.id, facts_.shards, wiring_.tables),
       keeper_(wiring_.start.state, wiring_.keep_state),
       names_({facts_, limits_, membership_, watches_}),
-      runner_({facts_, wiring_.shards, membership_, watches_, publisher_, keeper_, &names_}),
+      runner_(
+          {facts_, limits_, wiring_.shards, membership_, watches_, publisher_, keeper_, &names_}),
       returns_published_(membership_.sessions().returns_until().has_value()) {
   GIMNET_CHECK(wiring_.shards.shards() == facts_.shards);
   if (wiring_.network) {
@@ -134,11 +135,13 @@ void Conductor::attach(Stranger& stranger, const proto::Hello& hello,
   command.known_taken = hello.resume_taken;
   command.peer_resume_bytes = hello.resume_buffer_bytes;
   command.peer_frame_bytes = hello.frame_length_max;
-  runner_.tell_again(session, command);
+  const auto seen = std::exchange(session.change_seen, membership_.services().changes());
+  runner_.tellings().add_moved(session, seen, command.told);
   // Before the command, which lets WELCOME out: who has seen that can be reached. The id is
   // nobody's before.
   publisher_.publish_node(session.index, membership_);
   wiring_.shards.send(session.place.shard, std::move(command));
+  runner_.tellings().join_moved(session, seen);
   session.closing.reset();
   session.renumbered = false;
   log_line(LogLevel::info, subject("joined", session),
@@ -179,6 +182,9 @@ void Conductor::on_event(ShardEvent event, milliseconds now) {
   } else if (const auto* detached = std::get_if<DetachedEvent>(&event.what)) {
     is_link(detached->node) ? links_->on_detached(*detached, moment(now))
                             : on_detached(*detached, now);
+  } else if (const auto* missed = std::get_if<EventsMissedEvent>(&event.what)) {
+    if (const Session* session = find(missed->session, missed->node))
+      runner_.events_missed(*session, missed->attachment);
   } else if (std::holds_alternative<DrainedEvent>(event.what) && shards_to_drain_ > 0) {
     --shards_to_drain_;
   }
@@ -386,15 +392,16 @@ NodeId Conductor::node_id(const Session& session) const {
   return membership_.sessions().node_id(session);
 }
 
-bool Conductor::serve_watches(milliseconds now) {
+bool Conductor::tell_rest(milliseconds now) {
+  const bool more_services = runner_.tell_rest();
   const std::uint64_t resyncs = watches_.resyncs();
-  const bool more =
+  const bool more_watched =
       watches_.serve(membership_, now, [this](NodeIndex node, const proto::Payload& events) {
         const Session* session = membership_.sessions().find(node);
         if (session != nullptr) runner_.send_event(*session, events);
       });
   request_counters_.resyncs.add(watches_.resyncs() - resyncs);
-  return more;
+  return more_services || more_watched;
 }
 
 }  // namespace gimnet::hub

@@ -92,9 +92,12 @@ class Conductor final : private Administration {
   /// Do lists wait to be freed? Then tick() wants to be called from time to time.
   [[nodiscard]] bool has_garbage() const { return publisher_.garbage() > 0; }
 
-  /// Tells those who watch names and services what they have not heard yet, a bounded piece of it.
-  /// True: there is more. To be called after events were taken, and again as long as there is more.
-  [[nodiscard]] bool serve_watches(std::chrono::milliseconds now);
+  /// Tells nodes what they have not heard yet of services and of what they watch, a bounded piece
+  /// of it. True: there is more. To be called after events were taken, and again as long as there
+  /// is more.
+  [[nodiscard]] bool tell_rest(std::chrono::milliseconds now);
+  /// Do subscribers wait to be told of services?
+  [[nodiscard]] bool tells_later() const { return !runner_.tellings().empty(); }
 
   /// Reads the configuration again. With faults nothing changes; else all that may change does,
   /// here at once and on each shard before its next turn. Says in the log what came of it.
@@ -128,7 +131,6 @@ class Conductor final : private Administration {
   }
   /// Closes a connection that asks too often for what it cannot have.
   void on_oddity(const ControlFrameEvent& event, std::chrono::milliseconds now);
-  /// The node has read the WELCOME of that connection.
   void on_detached(const DetachedEvent& event, std::chrono::milliseconds now);
   void close(const Session& session, proto::GoodbyeCode code, std::string sentence);
   /// The session that the event is about, if it is still the same one.

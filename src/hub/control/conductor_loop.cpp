@@ -97,7 +97,7 @@ struct ConductorLoop::Impl {
     const auto after = door.acceptor.accept_some(
         [this, moment](Stranger stranger) { strangers.enter(std::move(stranger), moment); });
     see_off_leaving();
-    serve_watches();  // a newcomer that finds no room has those served who said HELLO
+    tell_rest();  // a newcomer that finds no room has those served who said HELLO
     arm_timer();
     if (after == Acceptor::After::wait) return watch_door(door);
     door.pause.expires_after(milliseconds{Acceptor::kPauseMs});
@@ -151,7 +151,7 @@ struct ConductorLoop::Impl {
     strangers_watch.wait([this] {
       look_whether_it_stood();
       serve_strangers();
-      serve_watches();
+      tell_rest();
       arm_timer();
       end_if_all_left();
       watch_strangers();
@@ -170,7 +170,7 @@ struct ConductorLoop::Impl {
       if (!wiring.inbox.empty()) take_present();
     }
     see_off_leaving();
-    serve_watches();
+    tell_rest();
     arm_timer();
     if (wiring.conductor.drain_wanted() && !stopping) begin_drain();
     end_if_all_left();
@@ -206,12 +206,12 @@ struct ConductorLoop::Impl {
   }
 
   /// What is left waits behind strangers, timers and events.
-  void serve_watches() {
-    if (serving_watches || !wiring.conductor.serve_watches(now())) return;
-    serving_watches = true;
+  void tell_rest() {
+    if (telling || !wiring.conductor.tell_rest(now())) return;
+    telling = true;
     asio::post(context, [this] {
-      serving_watches = false;
-      serve_watches();
+      telling = false;
+      tell_rest();
     });
   }
 
@@ -233,7 +233,7 @@ struct ConductorLoop::Impl {
       armed.reset();
       wiring.conductor.tick(now());
       strangers.tick(now());
-      serve_watches();
+      tell_rest();
       arm_timer();
       end_if_all_left();
     });
@@ -312,8 +312,8 @@ struct ConductorLoop::Impl {
   asio::signal_set reloads;
   std::vector<std::unique_ptr<Door>> doors;
   bool stopping = false;
-  bool gave_up = false;          ///< a shard did not drain in time
-  bool serving_watches = false;  ///< a piece of it is posted
+  bool gave_up = false;  ///< a shard did not drain in time
+  bool telling = false;  ///< a piece of it is posted
 };
 
 ConductorLoop::ConductorLoop(const Wiring& wiring, std::vector<std::unique_ptr<Listener>> listeners)

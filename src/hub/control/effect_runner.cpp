@@ -1,10 +1,8 @@
 #include "hub/control/effect_runner.hpp"
 
-#include <map>
 #include <utility>
 
 #include "hub/control/change_log.hpp"
-#include "hub/control/state/records.hpp"
 #include "hub/shard/control_frame.hpp"
 #include "proto/control/ns_register.hpp"
 
@@ -19,6 +17,7 @@ namespace ns = proto::ns;
 GroupId EffectRunner::group_id(GroupIndex group) const { return make_id(parts_.facts.id, group); }
 
 void EffectRunner::carry_out(const Effects& effects, milliseconds now) {
+  to_tell_ = parts_.limits.told_at_once;
   // First what has to outlive a crash, and once for all of them: what follows is seen by others.
   for (const Effect& effect : effects) {
     if (!std::holds_alternative<StateDue>(effect)) continue;
@@ -56,14 +55,8 @@ void EffectRunner::run(const GroupChanged& effect) {
   parts_.publisher.publish_group(effect.index, parts_.membership);
 }
 
-void EffectRunner::run(const ProviderChanged& effect) {
-  parts_.publisher.publish_provider(effect.index, parts_.membership);
-}
-
 void EffectRunner::run(const MemberChanged& effect) {
-  if (!parts_.publisher.publish_member(effect.group, effect.subscriber, parts_.membership)) {
-    run(GroupChanged{effect.group});
-  }
+  parts_.publisher.publish_members(effect.group, {&effect.subscriber, 1}, parts_.membership);
 }
 
 void EffectRunner::run(const SessionEnded& effect) {
@@ -78,63 +71,15 @@ void EffectRunner::run(const RenumberDue& effect) {
                                      effect.sentence});
 }
 
-/// One frame for all that have the same window.
 void EffectRunner::run(const ServiceMoved& effect) {
-  const Topic* topic = parts_.membership.services().find(effect.full_name);
-  if (topic == nullptr) return;
-  std::map<std::uint32_t, std::vector<std::vector<TellCommand::To>>> by_window;
-  const auto frame = [&](std::uint32_t window) {
-    return control_frame(proto::Kind::ns, NodeId{}, parts_.facts.id, payload_of(*topic, window));
-  };
-  const auto tell = [&](std::uint32_t window, std::size_t shard, std::vector<TellCommand::To>& to) {
-    parts_.shards.send(ShardIndex{static_cast<std::uint8_t>(shard)},
-                       TellCommand{std::exchange(to, {}), frame(window)});
-  };
-  for (const NodeIndex subscriber : topic->subscribers) {
-    const Session* session = find(subscriber);
-    // When it is back it is told by tell_again().
-    if (session == nullptr || !session->connected) continue;
-    const std::uint32_t window = topic->window_of(subscriber);
-    auto& by_shard = by_window[window];
-    by_shard.resize(parts_.shards.shards());
-    const std::size_t shard = session->place.shard.value();
-    by_shard[shard].push_back(
-        {ref_of(session->place), parts_.membership.sessions().node_id(*session)});
-    if (by_shard[shard].size() == TellCommand::kToMost) tell(window, shard, by_shard[shard]);
-  }
-  for (auto& [window, by_shard] : by_window) {
-    for (std::size_t shard = 0; shard < by_shard.size(); ++shard) {
-      if (!by_shard[shard].empty()) tell(window, shard, by_shard[shard]);
-    }
-  }
-}
-
-void EffectRunner::tell_again(Session& session, AttachCommand& command) const {
-  const Services& services = parts_.membership.services();
-  for (const Topic* topic : services.moved_since(session.index, session.change_seen)) {
-    const auto frame = control_frame(proto::Kind::ns, command.node, parts_.facts.id,
-                                     payload_of(*topic, topic->window_of(session.index)));
-    command.told.insert(command.told.end(), frame.begin(), frame.end());
-  }
-  session.change_seen = services.changes();
-}
-
-proto::Payload EffectRunner::payload_of(const Topic& topic, std::uint32_t window) const {
-  ns::ServiceMoved event;
-  event.name = std::string{topic.full_name};
-  const NameCopies* names = parts_.names == nullptr ? nullptr : parts_.names->copies();
-  put_state(event, HubTitle{parts_.facts.id, parts_.facts.name}, topic, parts_.membership, names);
-  event.window = window;
-  return proto::encode(event);
+  tellings_.put(effect);
+  tellings_.work_off(to_tell_);
 }
 
 void EffectRunner::run(const PaceDue& effect) {
   const Session* session = find(effect.subscriber);
-  if (session == nullptr) return;
-  const PaceTerms terms{effect.terms.window, effect.terms.depth, effect.terms.interval_us};
-  parts_.shards.send(session->place.shard,
-                     PaceCommand{ref_of(session->place), group_id(effect.group), terms,
-                                 effect.retained, effect.was_plain, effect.terms.number});
+  const Topic* topic = parts_.membership.services().find_group(effect.group);
+  if (session != nullptr && topic != nullptr) tellings_.begin_pace(*topic, *session, false);
 }
 
 void EffectRunner::run(const PaceEnded& effect) {
@@ -157,21 +102,37 @@ void EffectRunner::run(const SubscribersChanged& effect) {
   if (topic == nullptr || !topic->provided()) return;
   const Session* session = find(topic->service->provider);
   if (session == nullptr) return;
-  const auto number = static_cast<std::uint32_t>(topic->subscribers.size());
-  send_event(*session, proto::encode(ns::Subscribers{group_id(topic->service->group), number}));
+  send_event(*session, tellings_.subscribers_event(*topic));
 }
 
 void EffectRunner::run(const NameLost& effect) {
   const Session* session = find(effect.node);
   if (session == nullptr) return;
-  send_event(*session, proto::encode(ns::NameLost{effect.name, effect.holder, effect.sentence}));
+  // The later half of the answer to the node's own request, which nobody could tell again.
+  send(*session, proto::encode(ns::NameLost{effect.name, effect.holder, effect.sentence}));
+}
+
+bool EffectRunner::tell_rest() {
+  to_tell_ = parts_.limits.told_at_once;
+  tellings_.work_off(to_tell_);
+  return !tellings_.empty();
+}
+
+void EffectRunner::events_missed(const Session& session, std::uint32_t attachment) {
+  tellings_.put(session.index, attachment);
 }
 
 void EffectRunner::send_event(const Session& session, const proto::Payload& payload) {
+  SendControlCommand command;
+  command.may_drop = true;
+  send(session, payload, std::move(command));
+}
+
+void EffectRunner::send(const Session& session, const proto::Payload& payload,
+                        SendControlCommand command) {
   // When it is back it is told how services moved, and learns the rest from the answers to what it
   // declares again.
   if (!session.connected) return;
-  SendControlCommand command;
   command.session = ref_of(session.place);
   command.frame = control_frame(proto::Kind::ns, parts_.membership.sessions().node_id(session),
                                 parts_.facts.id, payload);

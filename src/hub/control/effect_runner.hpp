@@ -10,6 +10,8 @@
 #include "hub/control/state/watches.hpp"
 #include "hub/control/state_keeper.hpp"
 #include "hub/control/table_publisher.hpp"
+#include "hub/control/tellings.hpp"
+#include "hub/limits.hpp"
 #include "proto/control/control_message.hpp"
 
 namespace gimnet::hub {
@@ -22,6 +24,7 @@ class EffectRunner {
  public:
   struct Parts {
     const HubFacts& facts;
+    const Limits& limits;
     ShardProxy& shards;
     Membership& membership;
     Watches& watches;
@@ -29,19 +32,26 @@ class EffectRunner {
     StateKeeper& keeper;
     NetworkNames* names = nullptr;  ///< or none: a hub alone
   };
-  explicit EffectRunner(const Parts& parts) : parts_(parts) {}
+  explicit EffectRunner(const Parts& parts)
+      : parts_(parts),
+        tellings_({parts.facts, parts.shards, parts.membership, parts.watches, parts.publisher,
+                   parts.names}) {}
 
+  /// Tells limits.told_at_once subscribers at most; the others wait for tell_rest().
   void carry_out(const Effects& effects, std::chrono::milliseconds now);
-  /// Sends an event of kind NS; nothing to a node that is away.
+  /// The next piece of what nodes have yet to be told of services. True: there is more.
+  [[nodiscard]] bool tell_rest();
+  /// Events for that connection were dropped, and its control queue is empty: the node is to be
+  /// told again.
+  void events_missed(const Session& session, std::uint32_t attachment);
+  /// Sends an event of kind NS, which is dropped if the node does not take what it is told; nothing
+  /// to a node that is away.
   void send_event(const Session& session, const proto::Payload& payload);
-  /// Adds what the node has to be told ahead of all else, since it came back: the services that
-  /// changed since its previous connection began.
-  void tell_again(Session& session, AttachCommand& command) const;
+  [[nodiscard]] const Tellings& tellings() const { return tellings_; }
 
  private:
   void run(const NodeChanged& effect);
   void run(const GroupChanged& effect);
-  void run(const ProviderChanged& effect);
   void run(const MemberChanged& effect);
   void run(const SessionEnded& effect);
   void run(const RenumberDue& effect);
@@ -56,10 +66,12 @@ class EffectRunner {
   [[nodiscard]] const Session* find(NodeIndex node) const {
     return parts_.membership.sessions().find(node);
   }
+  void send(const Session& session, const proto::Payload& payload, SendControlCommand command = {});
   [[nodiscard]] GroupId group_id(GroupIndex group) const;
-  [[nodiscard]] proto::Payload payload_of(const Topic& topic, std::uint32_t window) const;
 
   const Parts parts_;
+  Tellings tellings_;
+  std::uint64_t to_tell_ = 0;  ///< subscribers, in this step
 };
 
 }  // namespace gimnet::hub

@@ -32,54 +32,30 @@ void TablePublisher::publish_node(NodeIndex index, const Membership& membership)
 }
 
 void TablePublisher::publish_group(GroupIndex index, const Membership& membership) {
-  std::unique_ptr<GroupMembers> members;
-  if (const Topic* topic = membership.services().find_group(index); topic != nullptr) {
-    members = std::make_unique<GroupMembers>();
-    put_provider(*members, topic->service->provider, membership);
-    members->by_shard.resize(shards_);
-    members->retain = topic->service->terms.retain;
-    members->accepts = topic->service->terms.direction == proto::ns::Direction::accepts;
-    for (const NodeIndex subscriber : topic->subscribers) {
-      const NodePlace place = place_of(subscriber, membership);
-      GIMNET_CHECK(place.exists());
-      put(*members, *topic, subscriber, place);
-    }
-  }
+  const Topic* topic = membership.services().find_group(index);
+  if (topic == nullptr) return replace(index, nullptr);
+  const auto found = published_.find(index);
+  auto members = found != published_.end() ? std::make_unique<GroupMembers>(*found->second)
+                                           : std::make_unique<GroupMembers>();
+  const Session* provider = membership.sessions().find(topic->service->provider);
+  members->provider = provider == nullptr ? NodeId{} : make_id(hub_, provider->index);
+  members->provider_place = provider == nullptr ? NodePlace{} : node_place(*provider);
+  members->by_shard.resize(shards_);
+  members->retain = topic->service->terms.retain;
+  members->accepts = topic->service->terms.direction == proto::ns::Direction::accepts;
   replace(index, std::move(members));
 }
 
-void TablePublisher::publish_provider(GroupIndex index, const Membership& membership) {
+void TablePublisher::publish_members(GroupIndex index, std::span<const NodeIndex> subscribers,
+                                     const Membership& membership) {
   const auto found = published_.find(index);
   const Topic* topic = membership.services().find_group(index);
-  if (found == published_.end() || topic == nullptr) return publish_group(index, membership);
+  if (found == published_.end() || topic == nullptr) return;
   auto members = std::make_unique<GroupMembers>(*found->second);
-  put_provider(*members, topic->service->provider, membership);
+  for (const NodeIndex subscriber : subscribers) put(*members, *topic, subscriber, membership);
+  const auto is_empty = [](const auto& list) { return list.empty(); };
+  if (std::ranges::all_of(members->paced_by_shard, is_empty)) members->paced_by_shard.clear();
   replace(index, std::move(members));
-}
-
-void TablePublisher::put_provider(GroupMembers& members, NodeIndex provider,
-                                  const Membership& membership) const {
-  const Session* session = membership.sessions().find(provider);
-  members.provider = session == nullptr ? NodeId{} : make_id(hub_, provider);
-  members.provider_place = session == nullptr ? NodePlace{} : node_place(*session);
-}
-
-bool TablePublisher::publish_member(GroupIndex index, NodeIndex subscriber,
-                                    const Membership& membership) {
-  const auto found = published_.find(index);
-  const Topic* topic = membership.services().find_group(index);
-  const NodePlace place = place_of(subscriber, membership);
-  if (found == published_.end() || topic == nullptr || !place.exists()) return false;
-  auto members = std::make_unique<GroupMembers>(*found->second);
-  members->by_shard[place.shard.value()].erase(place.slot);
-  auto& paced = members->paced_by_shard;
-  if (!paced.empty() && paced[place.shard.value()].erase(place.slot)) {
-    if (std::ranges::all_of(paced, [](const auto& list) { return list.empty(); })) paced.clear();
-  }
-  if (std::ranges::binary_search(topic->subscribers, subscriber))
-    put(*members, *topic, subscriber, place);
-  replace(index, std::move(members));
-  return true;
 }
 
 NodePlace TablePublisher::place_of(NodeIndex node, const Membership& membership) const {
@@ -88,15 +64,23 @@ NodePlace TablePublisher::place_of(NodeIndex node, const Membership& membership)
   return node_place(*session);
 }
 
+/// In one of the two lists, or in none if it is no subscriber any more.
 void TablePublisher::put(GroupMembers& members, const Topic& topic, NodeIndex subscriber,
-                         const NodePlace& place) const {
-  if (!topic.pace_of(subscriber)) {
-    members.by_shard[place.shard.value()].put({place.slot, place.generation});
-    return;
-  }
-  members.paced_by_shard.resize(shards_);
+                         const Membership& membership) const {
+  const NodePlace place = place_of(subscriber, membership);
+  GIMNET_CHECK(place.exists());
+  const std::size_t shard = place.shard.value();
+  auto& plain = members.by_shard[shard];
+  auto& paced = members.paced_by_shard;
+  const bool subscribed = std::ranges::binary_search(topic.subscribers, subscriber);
+  const bool has_pace = subscribed && topic.pace_of(subscriber);
+  if (!subscribed || has_pace) plain.erase(place.slot);
+  if (!has_pace && !paced.empty()) paced[shard].erase(place.slot);
+  if (!subscribed) return;
+  if (!has_pace) return plain.put({place.slot, place.generation});
+  paced.resize(shards_);
   const bool was_plain = topic.once_plain.contains(subscriber);
-  members.paced_by_shard[place.shard.value()].put({place.slot, place.generation, was_plain});
+  paced[shard].put({place.slot, place.generation, was_plain});
 }
 
 void TablePublisher::replace(GroupIndex index, std::unique_ptr<const GroupMembers> members) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <deque>
 #include <memory>
+#include <span>
 #include <unordered_map>
 
 #include "hub/concurrent/quiescence.hpp"
@@ -30,16 +31,14 @@ class TablePublisher {
 
   /// Publishes what `membership` says of the node now.
   void publish_node(NodeIndex index, const Membership& membership);
-  /// Publishes what `membership` says of the group now: as much work as the group has members.
+  /// Publishes who provides the group now, or that there is no such group any more. A new group has
+  /// no members yet; those of a known one are shared with the entry that stood there.
   void publish_group(GroupIndex index, const Membership& membership);
-  /// Publishes who provides the group now, and nothing else: the lists of members are shared.
-  void publish_provider(GroupIndex index, const Membership& membership);
-  /// Publishes what `membership` says of that subscriber of the group, and of nothing else: little
-  /// work, whatever the group's size. False: nothing was done, since the group, or where the node
-  /// lives, is not published; publish_group() is due. REQUIRES: the node lives where the table of
-  /// nodes says, if its session is over.
-  [[nodiscard]] bool publish_member(GroupIndex index, NodeIndex subscriber,
-                                    const Membership& membership);
+  /// Publishes what `membership` says of those subscribers of the group, and of nothing else:
+  /// little work, whatever the group's size. Nothing, if the group is not published or is to go.
+  /// REQUIRES: a node whose session is over lives where the table of nodes says.
+  void publish_members(GroupIndex index, std::span<const NodeIndex> subscribers,
+                       const Membership& membership);
 
   /// Frees what nobody looks at any more.
   void collect();
@@ -52,9 +51,8 @@ class TablePublisher {
   };
   /// Where the node lives, or lived until now.
   [[nodiscard]] NodePlace place_of(NodeIndex node, const Membership& membership) const;
-  void put_provider(GroupMembers& members, NodeIndex provider, const Membership& membership) const;
   void put(GroupMembers& members, const Topic& topic, NodeIndex subscriber,
-           const NodePlace& place) const;
+           const Membership& membership) const;
   void replace(GroupIndex index, std::unique_ptr<const GroupMembers> members);
 
   const HubId hub_;

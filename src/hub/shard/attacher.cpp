@@ -30,6 +30,7 @@ void Attacher::attach(AttachCommand command) {
   connection.attachment = command.attachment;
   connection.connected = true;
   connection.write = WriteState::open;
+  connection.events = EventState::told;
   connection.frame_bytes = command.peer_frame_bytes;
   state_.router.forget_flows();
   connection.last_heard_ms = connection.last_sent_ms = state_.now_ms;

@@ -20,11 +20,11 @@
 // Nothing else crosses between the two threads, but for the tables that control publishes.
 //
 // Order: the conductor publishes a node before it sends AttachCommand, which lets WELCOME out, and
-// sends AttachCommand before it names the node to anybody else; it sends a SERVICE_MOVED before the
-// answer that lets the provider send, and once more with the AttachCommand of a node that comes
-// back; it publishes a group before it sends the PaceCommand of a member, and that before
-// any answer; it sends a RenumberCommand before it names the new id to anybody else, and publishes
-// a group that accepts data before SERVICE_MOVED tells senders of it. So commands that wait are
+// sends AttachCommand before it names the node to anybody else; it tells a subscriber SERVICE_MOVED
+// before it makes it a member of the new group, and once more with the AttachCommand of a node that
+// comes back; it publishes a member before it sends the PaceCommand for it, and that before the
+// answer; it sends a RenumberCommand before it names the new id to anybody else, and publishes a
+// group that accepts data before SERVICE_MOVED tells senders of it. So commands that wait are
 // carried out before mail that came after them: a frame neither finds its recipient unattached, or
 // on a connection on which it has another id, nor overtakes the event about it.
 //
@@ -98,16 +98,19 @@ struct CountsBegin {
 /// A control frame (header and payload) for a session; goes before the data lanes. `answers` is how
 /// many of the session's unanswered requests it settles: 1 for an answer, 0 for an event. An answer
 /// is for the connection that asked: it is dropped if `attachment` is not the present one. 0 is
-/// whichever there is; without one it is dropped.
+/// whichever there is; without one it is dropped. `may_drop`: an event that does not close the
+/// connection if its control queue is half full, but is missed (EventsMissedEvent).
 struct SendControlCommand {
   SessionRef session;
   std::uint32_t attachment = 0;
   std::vector<std::byte> frame;
   std::uint32_t answers = 0;
   std::optional<CountsBegin> counts{};  ///< that begin with the frame
+  bool may_drop = false;
 };
 
-/// One event for many sessions of a shard, encoded once: each gets it as by a SendControlCommand.
+/// One event for many sessions of a shard, encoded once: each gets it as by a SendControlCommand
+/// that may be dropped.
 struct TellCommand {
   /// As many sessions as the commands that a shard carries out in one turn.
   static constexpr std::size_t kToMost = 256;
@@ -117,6 +120,15 @@ struct TellCommand {
   };
   std::vector<To> to;            ///< at most kToMost
   std::vector<std::byte> frame;  ///< to node 0: set_destination() for each of them
+};
+
+/// What a connection missed since events for it were dropped, as it is now: control frames, ahead
+/// of all that waits for it, whatever their size. Events are for it again from here on. Nothing if
+/// `attachment` is not the present one.
+struct TellAgainCommand {
+  SessionRef session;
+  std::uint32_t attachment = 0;
+  std::vector<std::byte> frames;
 };
 
 /// Say GOODBYE and close the session's connection. The session itself stays until ReleaseCommand.
@@ -134,7 +146,8 @@ struct ReleaseCommand {
 
 /// The session's subscription to that group is paced from now on, or has other terms. `retained`:
 /// it begins with the last message. `was_plain`: until then it got everything. `number`: of its
-/// counts, if it begins.
+/// counts, if it begins. `with_event`: it does not begin on a connection that misses events, since
+/// its node does not know the group yet; it is sent again behind the TellAgainCommand.
 struct PaceCommand {
   SessionRef session;
   GroupId group;
@@ -142,6 +155,7 @@ struct PaceCommand {
   bool retained = false;
   bool was_plain = false;
   std::uint8_t number = 0;
+  bool with_event = false;
 };
 
 /// A paced subscription ended, or its group is gone.
@@ -179,9 +193,10 @@ struct DrainCommand {
 /// End the shard's thread.
 struct StopCommand {};
 
-using ShardCommand = std::variant<AttachCommand, SendControlCommand, TellCommand, CloseCommand,
-                                  ReleaseCommand, RenumberCommand, LimitsCommand, PaceCommand,
-                                  EndPaceCommand, ForgetRetainedCommand, DrainCommand, StopCommand>;
+using ShardCommand =
+    std::variant<AttachCommand, SendControlCommand, TellCommand, TellAgainCommand, CloseCommand,
+                 ReleaseCommand, RenumberCommand, LimitsCommand, PaceCommand, EndPaceCommand,
+                 ForgetRetainedCommand, DrainCommand, StopCommand>;
 
 // ---- shard -> conductor
 // --------------------------------------------------------------------------------------------
@@ -213,6 +228,14 @@ struct DetachedEvent {
   std::uint64_t taken = 0;       ///< data frames from the other end
 };
 
+/// Events for a connection were dropped, because its control queue was half full; now it is empty.
+/// More are dropped until the TellAgainCommand that answers this.
+struct EventsMissedEvent {
+  SessionRef session;
+  std::uint32_t attachment = 0;
+  NodeId node;
+};
+
 /// A connection to which GOODBYE was written: what its peer still sends is thrown away for a
 /// moment, since closing with unread bytes would reset the connection and could take the GOODBYE
 /// with it.
@@ -225,7 +248,8 @@ struct DrainedEvent {};
 
 struct ShardEvent {
   ShardIndex shard;
-  std::variant<ControlFrameEvent, DetachedEvent, FarewellEvent, DrainedEvent> what;
+  std::variant<ControlFrameEvent, DetachedEvent, EventsMissedEvent, FarewellEvent, DrainedEvent>
+      what;
 };
 
 }  // namespace gimnet::hub

@@ -63,7 +63,8 @@ struct Connection : Recipient {
   ReadGate gate;
   WriteState write = WriteState::gone;
   bool must_confirm = false;  ///< nothing more can be written before its CONFIRM: read even if held
-  bool gauged = false;        ///< its queue gauge is not 0
+  EventState events = EventState::told;
+  bool gauged = false;         ///< its queue gauge is not 0
   bool missed_resume = false;  ///< RESUME had no place: it would stay paused for ever
   bool goes_on = false;        ///< its token stands in with_rest
   Backoff read_again;          ///< of reading it twice in a turn

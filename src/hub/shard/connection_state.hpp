@@ -35,6 +35,13 @@ enum class WriteState : std::uint8_t {
   gone,     ///< there is no transport
 };
 
+/// Does a connection get events? One that does not take them misses them until it is told again.
+enum class EventState : std::uint8_t {
+  told,
+  missed,
+  asked,  ///< its control queue is empty; the conductor was asked to tell it again
+};
+
 /// The readiness that the poller waits for. must_confirm: nothing more can be written before the
 /// peer's CONFIRM, which may lie behind data for which it is held: two nodes that flood each other
 /// would wait for ever. A rest is routed within the next turns, and is not worth a system call.

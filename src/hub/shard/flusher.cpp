@@ -66,6 +66,8 @@ void Flusher::flush(Connection& connection) {
   counters.delivered.add(state_.tally.delivered - delivered_before);
   if (sent_data && connection.progress) connection.progress->data_end = connection.sent_bytes;
   if (sent != 0) connection.last_sent_ms = state_.now_ms;
+  if (connection.events == EventState::missed && connection.outbox.control().empty())
+    ask_to_be_told(connection);
   switch (result) {
     case Flush::emptied:
       return on_emptied(connection);
@@ -88,6 +90,12 @@ void Flusher::flush(Connection& connection) {
 /// confirm only with keep-alive.
 void Flusher::ask_for_confirm(Connection& connection) {
   send_flow(state_, connection, proto::flow::Ping{++connection.ping_sequence, wall_now_ns()});
+}
+
+void Flusher::ask_to_be_told(Connection& connection) {
+  connection.events = EventState::asked;
+  state_.tell_conductor({state_.self, EventsMissedEvent{connection.session(), connection.attachment,
+                                                        connection.node}});
 }
 
 /// What was not written stays: for a transport that takes no more, for a confirmation, or for the

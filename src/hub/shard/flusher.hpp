@@ -30,6 +30,7 @@ class Flusher {
 
  private:
   void ask_for_confirm(Connection& connection);
+  void ask_to_be_told(Connection& connection);
   void let_wait(Connection& connection);
   /// Tells the node how many frames were dropped because its queue was full.
   void tell_losses(Connection& connection);

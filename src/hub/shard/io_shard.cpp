@@ -245,9 +245,11 @@ void IoShard::execute(ShardCommand& command) {
                    if (control.counts)
                      state_.pacer.begin_counts(*connection, control.counts->group,
                                                control.counts->number);
+                   if (control.may_drop) return say_event(*connection, control.frame);
                    say(*connection, control.frame);
                  },
                  [&](TellCommand& told) { tell(told); },
+                 [&](const TellAgainCommand& told) { tell_again(told); },
                  [&](CloseCommand& close) {
                    if (Connection* connection = state_.find(close.session)) {
                      closer_.close(*connection, close.code, std::move(close.sentence));
@@ -290,14 +292,33 @@ void IoShard::tell(TellCommand& command) {
     Connection* connection = state_.find(to.session);
     if (connection == nullptr || !connection->connected) continue;
     set_destination(command.frame, to.node);
-    say(*connection, command.frame);
+    say_event(*connection, command.frame);
   }
+}
+
+void IoShard::say_event(Connection& connection, std::span<const std::byte> frame) {
+  if (connection.events != EventState::told) return;
+  if (!connection.outbox.push_control(frame, state_.egress, state_.limits.control_bytes / 2))
+    connection.events = EventState::missed;
+  state_.recipients.mark_dirty(connection);
+}
+
+void IoShard::tell_again(const TellAgainCommand& command) {
+  Connection* connection = state_.find(command.session);
+  if (connection == nullptr || !connection->connected ||
+      connection->attachment != command.attachment)
+    return;
+  connection->events = EventState::told;
+  connection->outbox.push_first_control(command.frames, state_.egress);
+  state_.recipients.mark_dirty(*connection);
 }
 
 void IoShard::begin_pace(const PaceCommand& command) {
   Connection* connection = state_.find(command.session);
   if (connection == nullptr) return;
   const bool begins = Pacer::find(*connection, command.group) == nullptr;
+  const bool misses = connection->connected && connection->events != EventState::told;
+  if (begins && misses && command.with_event) return;
   PacedSubscription& subscription = state_.pacer.subscribe(
       *connection, command.group, command.terms, command.was_plain, command.number);
   subscription.retained = command.retained;

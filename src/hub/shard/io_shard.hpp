@@ -71,6 +71,8 @@ class IoShard {
   /// Hands a control frame to the connection, or closes it if too many wait.
   void say(Connection& connection, std::span<const std::byte> frame);
   void tell(TellCommand& command);
+  void say_event(Connection& connection, std::span<const std::byte> frame);
+  void tell_again(const TellAgainCommand& command);
   void begin_pace(const PaceCommand& command);
 
   ShardState state_;

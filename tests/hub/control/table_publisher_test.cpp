@@ -21,6 +21,9 @@ class TablePublisherTest : public ::testing::Test {
   void subscribe(const Session& session, const std::string& name) {
     EXPECT_TRUE(membership_.services().subscribe(session.index, name, {}, effects_));
   }
+  void publish_member(NodeIndex node) {
+    publisher_.publish_members(GroupIndex{1}, {&node, 1}, membership_);
+  }
 
   Limits limits_;
   Membership membership_{Sessions::Options{HubId{7}, 2, Placement::spread}, limits_};
@@ -55,6 +58,8 @@ TEST_F(TablePublisherTest, PublishesTheMembersOfAGroupByShard) {
   ASSERT_EQ(groups_.find(1)->by_shard.size(), 2u);
   subscribe(viewer, "robot/odom");
   publisher_.publish_group(GroupIndex{1}, membership_);
+  EXPECT_TRUE(groups_.find(1)->by_shard[viewer.place.shard.value()].empty()) << "it joins later";
+  publish_member(viewer.index);
   const auto& members = groups_.find(1)->by_shard[viewer.place.shard.value()];
   ASSERT_EQ(members.size(), 1u);
   ASSERT_NE(members.find(viewer.place.slot), nullptr);
@@ -79,16 +84,18 @@ TEST_F(TablePublisherTest, AnotherProviderIsPublishedAloneAndTheMembersStay) {
   const Session& far = join("far");
   ASSERT_TRUE(membership_.services().advertise(robot.index, "robot/odom", {}, 0ms, effects_));
   subscribe(far, "robot/odom");
-  publisher_.publish_provider(GroupIndex{1}, membership_);
-  ASSERT_NE(groups_.find(1), nullptr) << "all of it, where nothing was published";
+  publisher_.publish_group(GroupIndex{1}, membership_);
+  publish_member(far.index);
+  const GroupMembers* before = groups_.find(1);
   EXPECT_TRUE(groups_.find(1)->provided());
   ASSERT_FALSE(membership_.services().withdraw(robot.index, GroupIndex{1}, 0ms, effects_));
-  publisher_.publish_provider(GroupIndex{1}, membership_);
+  publisher_.publish_group(GroupIndex{1}, membership_);
+  ASSERT_NE(groups_.find(1), before);
   EXPECT_FALSE(groups_.find(1)->provided());
   EXPECT_FALSE(groups_.find(1)->provider_place.exists());
   EXPECT_EQ(groups_.find(1)->by_shard[far.place.shard.value()].size(), 1u);
   ASSERT_TRUE(membership_.services().advertise(far.index, "robot/odom", {}, 0ms, effects_));
-  publisher_.publish_provider(GroupIndex{1}, membership_);
+  publisher_.publish_group(GroupIndex{1}, membership_);
   EXPECT_EQ(index_of(groups_.find(1)->provider), far.index.value());
   EXPECT_EQ(groups_.find(1)->provider_place.shard, far.place.shard);
 }
@@ -98,20 +105,20 @@ TEST_F(TablePublisherTest, OneMemberMoreOrLessIsPublishedAloneAndTheListBeforeSt
   const Session& far = join("far");
   const Session& near = join("near");
   ASSERT_TRUE(membership_.services().advertise(robot.index, "robot/odom", {}, 0ms, effects_));
-  EXPECT_FALSE(publisher_.publish_member(GroupIndex{1}, far.index, membership_))
-      << "all of it is due";
+  publish_member(far.index);
+  EXPECT_EQ(groups_.find(1), nullptr) << "the group comes first";
   publisher_.publish_group(GroupIndex{1}, membership_);
   quiescence_.enter(0);
   subscribe(far, "robot/odom");
   subscribe(near, "robot/odom");
-  ASSERT_TRUE(publisher_.publish_member(GroupIndex{1}, far.index, membership_));
+  publish_member(far.index);
   const GroupMembers* before = groups_.find(1);
   EXPECT_EQ(before->by_shard[far.place.shard.value()].size(), 1u);
   EXPECT_TRUE(before->by_shard[near.place.shard.value()].empty()) << "its own effect is to come";
-  ASSERT_TRUE(publisher_.publish_member(GroupIndex{1}, near.index, membership_));
+  publish_member(near.index);
   EXPECT_EQ(groups_.find(1)->by_shard[near.place.shard.value()].size(), 1u);
   ASSERT_FALSE(membership_.services().unsubscribe(far.index, "robot/odom", 0ms, effects_));
-  ASSERT_TRUE(publisher_.publish_member(GroupIndex{1}, far.index, membership_));
+  publish_member(far.index);
   EXPECT_TRUE(groups_.find(1)->by_shard[far.place.shard.value()].empty());
   EXPECT_EQ(before->by_shard[far.place.shard.value()].size(), 1u);
   EXPECT_EQ(groups_.find(1)->provider, make_id(HubId{7}, robot.index));
@@ -128,7 +135,7 @@ TEST_F(TablePublisherTest, AMemberThatIsPacedIsInTheOtherList) {
   };
   const auto want = [&](const SubscriberTerms& terms) {
     ASSERT_TRUE(membership_.services().subscribe(viewer.index, "robot/odom", terms, effects_));
-    ASSERT_TRUE(publisher_.publish_member(GroupIndex{1}, viewer.index, membership_));
+    publish_member(viewer.index);
   };
   want({});
   EXPECT_EQ(paced(), nullptr);
@@ -137,8 +144,28 @@ TEST_F(TablePublisherTest, AMemberThatIsPacedIsInTheOtherList) {
   EXPECT_TRUE(paced()->was_plain);
   EXPECT_TRUE(groups_.find(1)->by_shard[viewer.place.shard.value()].empty());
   ASSERT_FALSE(membership_.services().unsubscribe(viewer.index, "robot/odom", 0ms, effects_));
-  ASSERT_TRUE(publisher_.publish_member(GroupIndex{1}, viewer.index, membership_));
+  publish_member(viewer.index);
   EXPECT_TRUE(groups_.find(1)->paced_by_shard.empty()) << "a group without any pays nothing for it";
+}
+
+TEST_F(TablePublisherTest, ManyMembersArePublishedInOneStep) {
+  const Session& robot = join("robot");
+  ASSERT_TRUE(membership_.services().advertise(robot.index, "robot/odom", {}, 0ms, effects_));
+  publisher_.publish_group(GroupIndex{1}, membership_);
+  std::vector<NodeIndex> some;
+  for (int i = 0; i < 10; ++i) {
+    const Session& viewer = join("viewer-" + std::to_string(i));
+    subscribe(viewer, "robot/odom");
+    if (i % 2 == 0) some.push_back(viewer.index);
+  }
+  quiescence_.enter(0);
+  publisher_.publish_members(GroupIndex{1}, some, membership_);
+  EXPECT_EQ(publisher_.garbage(), 1u);
+  const auto& lists = groups_.find(1)->by_shard;
+  EXPECT_EQ(lists[0].size() + lists[1].size(), some.size());
+  publisher_.publish_members(GroupIndex{1}, some, membership_);
+  EXPECT_EQ(groups_.find(1)->by_shard[0].size() + groups_.find(1)->by_shard[1].size(), some.size())
+      << "once more is no other member";
 }
 
 TEST_F(TablePublisherTest, AMemberWhoseSessionIsOverIsFoundWhereItLived) {
@@ -150,13 +177,12 @@ TEST_F(TablePublisherTest, AMemberWhoseSessionIsOverIsFoundWhereItLived) {
   ASSERT_TRUE(membership_.services().advertise(robot.index, "robot/odom", {}, 0ms, effects_));
   subscribe(viewer, "robot/odom");
   publisher_.publish_group(GroupIndex{1}, membership_);
+  publish_member(index);
+  ASSERT_EQ(groups_.find(1)->by_shard[place.shard.value()].size(), 1u);
   membership_.connection_ended(viewer, {true, proto::GoodbyeCode::done, ""}, 0ms, effects_);
   ASSERT_EQ(membership_.sessions().find(index), nullptr);
-  ASSERT_TRUE(publisher_.publish_member(GroupIndex{1}, index, membership_));
+  publish_member(index);
   EXPECT_TRUE(groups_.find(1)->by_shard[place.shard.value()].empty());
-  publisher_.publish_node(index, membership_);
-  EXPECT_FALSE(publisher_.publish_member(GroupIndex{1}, index, membership_))
-      << "nobody knows where it lived";
 }
 
 TEST_F(TablePublisherTest, FreesOldMembersOnlyWhenNoShardCanLookAtThem) {

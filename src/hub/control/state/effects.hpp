@@ -19,12 +19,8 @@ namespace gimnet::hub {
 struct NodeChanged {
   NodeIndex index;
 };
-/// Publish the members of this group, or that there is none any more.
+/// Publish who provides this group now, or that there is no such group any more.
 struct GroupChanged {
-  GroupIndex index;
-};
-/// Publish who provides this group now.
-struct ProviderChanged {
   GroupIndex index;
 };
 /// Publish whether and how that node is a member of this group.
@@ -51,9 +47,11 @@ struct RenumberDue {
   NodeIndex index;
   std::string sentence;
 };
-/// Tell a service's subscribers what it is now.
+/// Tell a service's subscribers what it is now, in pieces. `joins`: its group is new; each of them
+/// becomes a member, and is paced, once it was told.
 struct ServiceMoved {
   std::string full_name;
+  bool joins = false;
 };
 /// What a subscriber asked for. 0: not. `number`: of its counts (docs/protocol.md, section 8).
 struct SubscriberTerms {
@@ -63,14 +61,11 @@ struct SubscriberTerms {
   std::uint8_t number = 0;
   friend bool operator==(const SubscriberTerms&, const SubscriberTerms&) = default;
 };
-/// Have the subscriber's shard pace what it gets of a group: after the group was published. `terms`
-/// are in force.
+/// Have the subscriber's shard pace what it gets of a group, as Topic::pace_of() says: after the
+/// member was published.
 struct PaceDue {
   NodeIndex subscriber;
   GroupIndex group;
-  SubscriberTerms terms;
-  bool retained = false;   ///< it begins with the last message
-  bool was_plain = false;  ///< it got everything before, in this group
 };
 /// A subscription that was paced ended.
 struct PaceEnded {
@@ -113,9 +108,9 @@ struct ServiceNoted {
   std::string full_name;
 };
 
-using Effect = std::variant<NodeChanged, GroupChanged, ProviderChanged, MemberChanged, SessionEnded,
-                            ServiceMoved, PaceDue, PaceEnded, RetainedDropped, SubscribersChanged,
-                            CloseDue, RenumberDue, StateDue, NameLost, NodeNoted, ServiceNoted>;
+using Effect = std::variant<NodeChanged, GroupChanged, MemberChanged, SessionEnded, ServiceMoved,
+                            PaceDue, PaceEnded, RetainedDropped, SubscribersChanged, CloseDue,
+                            RenumberDue, StateDue, NameLost, NodeNoted, ServiceNoted>;
 using Effects = std::vector<Effect>;
 
 }  // namespace gimnet::hub

@@ -210,7 +210,7 @@ void Services::node_renumbered(NodeIndex node_index, NodeIndex new_index, Effect
   const Node& moved = nodes_.insert(std::move(node)).position->second;
   for (const Declared& declared : moved.provides) {
     declared.topic->service->provider = new_index;
-    effects.emplace_back(ProviderChanged{declared.topic->service->group});
+    effects.emplace_back(GroupChanged{declared.topic->service->group});
     tell_subscribers(*declared.topic, effects);
     effects.emplace_back(service_noted(ChangeKind::changed, *declared.topic));
   }
@@ -226,6 +226,10 @@ void Services::node_renumbered(NodeIndex node_index, NodeIndex new_index, Effect
     for (auto* changed : {&entry.once_plain, &entry.once_paced}) {
       if (changed->erase(node_index) != 0) changed->insert(new_index);
     }
+    // It may not have joined the group yet, and be passed over now that it stands elsewhere.
+    if (!entry.service) continue;
+    effects.emplace_back(MemberChanged{entry.service->group, new_index});
+    begin_pace(entry, new_index, effects);
   }
 }
 

@@ -134,6 +134,7 @@ class Services {
   [[nodiscard]] std::uint64_t changes() const { return changes_; }
   /// What the node subscribed to and subscribers were told of since that change, the latest last.
   [[nodiscard]] std::vector<const Topic*> moved_since(NodeIndex node, std::uint64_t change) const;
+  [[nodiscard]] std::vector<const Topic*> provided_by(NodeIndex node) const;
 
   /// nullptr: nobody provides it, nor waits for it.
   [[nodiscard]] const Topic* find(std::string_view full_name) const;
@@ -197,7 +198,7 @@ class Services {
   void change_terms(Topic& topic, NodeIndex subscriber, const SubscriberTerms& terms,
                     Effects& effects);
   [[nodiscard]] static ServiceNoted service_noted(proto::ns::ChangeKind kind, const Topic& topic);
-  void tell_subscribers(Topic& topic, Effects& effects);
+  void tell_subscribers(Topic& topic, Effects& effects, bool joins = false);
   void remove_subscriber(Topic& topic, NodeIndex node, std::chrono::milliseconds now,
                          Effects& effects);
 

@@ -34,13 +34,9 @@ void Services::enter_group(Topic& topic, const Service& service, milliseconds no
     effects.emplace_back(RetainedDropped{former->provider, former->group});
   topic.service = service;
   groups_[service.group] = &topic;
-  // Who is told may send at once to a group that accepts data; of one that provides, messages come
-  // at once to whoever may have to be told.
-  const bool accepts = service.terms.direction == proto::ns::Direction::accepts;
-  if (accepts) effects.emplace_back(GroupChanged{service.group});
-  tell_subscribers(topic, effects);
-  if (!accepts) effects.emplace_back(GroupChanged{service.group});
-  for (const NodeIndex subscriber : topic.subscribers) begin_pace(topic, subscriber, effects);
+  // Who is told may send at once to a group that accepts data.
+  effects.emplace_back(GroupChanged{service.group});
+  tell_subscribers(topic, effects, true);
   effects.emplace_back(service_noted(ChangeKind::advertised, topic));
 }
 
@@ -50,7 +46,7 @@ void Services::take_over(Topic& topic, NodeIndex provider, const ServiceTerms& t
   note_use(topic);
   topic.service->provider = provider;
   topic.service->terms.metadata = terms.metadata;
-  effects.emplace_back(ProviderChanged{topic.service->group});
+  effects.emplace_back(GroupChanged{topic.service->group});
   tell_subscribers(topic, effects);
   effects.emplace_back(service_noted(ChangeKind::advertised, topic));
 }
@@ -62,7 +58,7 @@ void Services::end_provision(Topic& topic, milliseconds now, Effects& effects) {
   topic.service->provider = kNobody;
   topic.orphan = ++orphaned_;
   orphans_[topic.orphan] = &topic;
-  effects.emplace_back(ProviderChanged{noted.group});
+  effects.emplace_back(GroupChanged{noted.group});
   if (topic.service->terms.retain)
     effects.emplace_back(RetainedDropped{noted.provider, noted.group});
   tell_subscribers(topic, effects);
@@ -119,16 +115,13 @@ std::optional<milliseconds> Services::next_deadline() const {
 }
 
 void Services::begin_pace(const Topic& topic, NodeIndex subscriber, Effects& effects) {
-  const std::optional<SubscriberTerms> pace = topic.pace_of(subscriber);
-  if (!pace) return;
-  effects.emplace_back(PaceDue{subscriber, topic.service->group, *pace, topic.service->terms.retain,
-                               topic.once_plain.contains(subscriber)});
+  if (topic.pace_of(subscriber)) effects.emplace_back(PaceDue{subscriber, topic.service->group});
 }
 
-void Services::tell_subscribers(Topic& topic, Effects& effects) {
+void Services::tell_subscribers(Topic& topic, Effects& effects, bool joins) {
   if (topic.subscribers.empty()) return;
   topic.change = ++changes_;
-  effects.emplace_back(ServiceMoved{std::string{topic.full_name}});
+  effects.emplace_back(ServiceMoved{std::string{topic.full_name}, joins});
 }
 
 void Services::note_moved(std::string_view full_name, Effects& effects) {
@@ -151,6 +144,14 @@ std::vector<const Topic*> Services::moved_since(NodeIndex node, std::uint64_t ch
   }
   std::ranges::sort(moved, {}, &Topic::change);
   return moved;
+}
+
+std::vector<const Topic*> Services::provided_by(NodeIndex node) const {
+  std::vector<const Topic*> provided;
+  const auto found = nodes_.find(node);
+  if (found == nodes_.end()) return provided;
+  for (const Declared& declared : found->second.provides) provided.push_back(declared.topic);
+  return provided;
 }
 
 }  // namespace gimnet::hub

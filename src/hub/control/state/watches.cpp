@@ -142,6 +142,16 @@ void Watches::taken(NodeIndex node, const ns::WatchTaken& taken) {
   found->second.under_way -= frames;
 }
 
+void Watches::start_over(NodeIndex node) {
+  const auto found = watchers_.find(node);
+  if (found == watchers_.end()) return;
+  found->second.under_way = 0;
+  for (Watch& watch : found->second.watches) {
+    watch.phase = Phase::begin;
+    watch.under_way = 0;
+  }
+}
+
 void Watches::connection_ended(NodeIndex node) {
   const auto found = watchers_.find(node);
   if (found == watchers_.end()) return;

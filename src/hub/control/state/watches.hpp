@@ -40,6 +40,8 @@ class Watches {
   [[nodiscard]] std::optional<proto::Refusal> unwatch(NodeIndex node, std::uint32_t number);
   /// The node took so many WATCH_EVENTS of a watch: it may have as many more.
   void taken(NodeIndex node, const proto::ns::WatchTaken& taken);
+  /// The node may not have got what it was sent: each of its watches begins again.
+  void start_over(NodeIndex node);
   /// The node's connection ended, and its watches with it.
   void connection_ended(NodeIndex node);
 

@@ -156,12 +156,12 @@ TEST_F(AdministerTest, WhoWatchesIsToldOfTheFormerIdAndOfTheNewOne) {
   const Node viewer = join("viewer");
   ASSERT_TRUE(ask<ns::AdvertiseAnswer>(robot_, ns::Advertise{.service = "odom"}));
   ASSERT_TRUE(ask<ns::WatchAnswer>(viewer, ns::Watch{.watch = 1, .pattern = "robot/**"}));
-  while (conductor.serve_watches(now)) {
+  while (conductor.tell_rest(now)) {
   }
   const std::size_t before = events<ns::WatchEvents>().size();
   const NodeId wanted = make_id<NodeId>(kHub, 77);
   ASSERT_TRUE(request(admin_, ctrl::Reassign{robot_.id, wanted}));
-  while (conductor.serve_watches(now)) {
+  while (conductor.tell_rest(now)) {
   }
   const auto told = events<ns::WatchEvents>();
   ASSERT_EQ(told.size(), before + 1);

@@ -19,7 +19,7 @@ class WatchHandlerTest : public ::testing::Test, protected TestConductor {
   ~WatchHandlerTest() override { set_log_level(LogLevel::info); }
   /// All changes that were told since the last call.
   std::vector<ns::Change> told() {
-    while (conductor.serve_watches(now)) {
+    while (conductor.tell_rest(now)) {
     }
     std::vector<ns::Change> changes;
     const auto all = events<ns::WatchEvents>();
@@ -67,11 +67,11 @@ TEST_F(WatchHandlerTest, WhatIsNotTakenIsNotFollowedByMore) {
   ASSERT_TRUE(ask<ns::WatchAnswer>(viewer, ns::Watch{.watch = 1}));
   for (int i = 0; i < 100; ++i) {
     join("robot-" + std::to_string(i));
-    static_cast<void>(conductor.serve_watches(now));
+    static_cast<void>(conductor.tell_rest(now));
   }
   EXPECT_EQ(events<ns::WatchEvents>().size(), 4u);
   ASSERT_TRUE(ask<ns::WatchTakenAnswer>(viewer, ns::WatchTaken{1, 1}));
-  static_cast<void>(conductor.serve_watches(now));
+  static_cast<void>(conductor.tell_rest(now));
   EXPECT_EQ(events<ns::WatchEvents>().size(), 5u);
   ASSERT_TRUE(ask<ns::UnwatchAnswer>(viewer, ns::Unwatch{1}));
   EXPECT_EQ(ask<ns::UnwatchAnswer>(viewer, ns::Unwatch{1}).error().status, Status::not_found);

@@ -20,14 +20,14 @@ using test::ServicesTest;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-TEST_F(ServicesTest, OtherTermsMeanAnotherGroupThatSubscribersAreToldFirst) {
+TEST_F(ServicesTest, OtherTermsMeanAnotherGroupThatSubscribersJoinAsTheyAreTold) {
   advertise(kRobot, "robot/odom");
   subscribe(kViewer, "robot/odom");
   take_words();
   ServiceTerms terms = odometry();
   terms.message_type = 99;
   EXPECT_EQ(advertise(kRobot, "robot/odom", terms), GroupIndex{2});
-  EXPECT_THAT(take_words(), ElementsAre("group 1", "moved robot/odom", "group 2"));
+  EXPECT_THAT(take_words(), ElementsAre("group 1", "group 2", "moved robot/odom, joins"));
   EXPECT_EQ(services_.find_group(GroupIndex{1}), nullptr);
   EXPECT_EQ(services_.services_of(kRobot), 1u);
 }
@@ -37,20 +37,19 @@ TEST_F(ServicesTest, WithdrawingTellsSubscribersAndKeepsThemWaiting) {
   subscribe(kViewer, "robot/odom");
   take_words();
   EXPECT_FALSE(services_.withdraw(kRobot, GroupIndex{1}, now_, effects_));
-  EXPECT_THAT(take_words(), ElementsAre("provider of 1", "moved robot/odom"));
+  EXPECT_THAT(take_words(), ElementsAre("group 1", "moved robot/odom"));
   EXPECT_FALSE(services_.find_group(GroupIndex{1})->provided());
   EXPECT_EQ(services_.provided(), 0u);
   EXPECT_EQ(services_.withdraw(kRobot, GroupIndex{1}, now_, effects_)->status, Status::not_found);
   // The same terms by anybody: the same group.
   EXPECT_EQ(advertise(kLogger, "robot/odom"), GroupIndex{1});
-  EXPECT_THAT(take_words(), ElementsAre("provider of 1", "moved robot/odom"));
+  EXPECT_THAT(take_words(), ElementsAre("group 1", "moved robot/odom"));
   EXPECT_FALSE(services_.withdraw(kLogger, GroupIndex{1}, now_, effects_));
   take_words();
   ServiceTerms terms = odometry();
   terms.retain = true;
   EXPECT_EQ(advertise(kRobot, "robot/odom", terms), GroupIndex{2});
-  EXPECT_THAT(take_words(),
-              ElementsAre("group 1", "moved robot/odom", "group 2", "pace 2 of 2: 0/1 retained"));
+  EXPECT_THAT(take_words(), ElementsAre("group 1", "group 2", "moved robot/odom, joins"));
 }
 
 TEST_F(ServicesTest, AGroupThatNobodyUsesIsGivenBackAfterAGraceTime) {
@@ -119,12 +118,13 @@ ServiceTerms map_in_sync() {
   return terms;
 }
 
-TEST_F(ServicesTest, AGroupIsPublishedBeforeItsMembersArePaced) {
+TEST_F(ServicesTest, AGroupIsPublishedBeforeItsMembersJoin) {
   const SubscriberTerms wanted{.window = 2, .depth = 3};
   EXPECT_TRUE(services_.subscribe(kViewer, "robot/map", wanted, effects_));
   EXPECT_THAT(take_words(), IsEmpty()) << "nobody provides it yet";
   EXPECT_EQ(advertise(kRobot, "robot/map", map_in_sync()), GroupIndex{1});
-  EXPECT_THAT(take_words(), ElementsAre("moved robot/map", "group 1", "pace 2 of 1: 2/3 retained"));
+  EXPECT_THAT(take_words(), ElementsAre("group 1", "moved robot/map, joins"));
+  EXPECT_EQ(services_.find("robot/map")->pace_of(kViewer), wanted);
   EXPECT_EQ(subscribe(kLogger, "robot/map"), Status::done);
   EXPECT_THAT(take_words(),
               ElementsAre("member 3 of 1", "pace 3 of 1: 4/1 retained", "subscribers robot/map"));
@@ -139,13 +139,12 @@ TEST_F(ServicesTest, AGroupIsPublishedBeforeItsMembersArePaced) {
   // In the table first: a frame that is read before the last message is forgotten must not make it
   // anew.
   EXPECT_EQ(advertise(kRobot, "robot/map"), GroupIndex{2});
-  EXPECT_THAT(take_words(), ElementsAre("no pace 2 of 1", "group 1", "forget 1 of 1",
-                                        "moved robot/map", "group 2"));
+  EXPECT_THAT(take_words(), ElementsAre("no pace 2 of 1", "group 1", "forget 1 of 1", "group 2",
+                                        "moved robot/map, joins"));
   EXPECT_EQ(advertise(kRobot, "robot/map", map_in_sync()), GroupIndex{3});
-  EXPECT_THAT(take_words(),
-              ElementsAre("group 2", "moved robot/map", "group 3", "pace 2 of 3: 4/1 retained"));
+  EXPECT_THAT(take_words(), ElementsAre("group 2", "group 3", "moved robot/map, joins"));
   EXPECT_FALSE(services_.withdraw(kRobot, GroupIndex{3}, now_, effects_));
-  EXPECT_THAT(take_words(), ElementsAre("provider of 3", "forget 3 of 1", "moved robot/map"));
+  EXPECT_THAT(take_words(), ElementsAre("group 3", "forget 3 of 1", "moved robot/map"));
 }
 
 }  // namespace

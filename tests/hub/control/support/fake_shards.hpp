@@ -25,7 +25,7 @@ class FakeShards final : public ShardProxy {
       told.push_back(tell->to.size());
       for (const TellCommand::To& to : tell->to) {
         set_destination(tell->frame, to.node);
-        send(shard, SendControlCommand{to.session, 0, tell->frame, 0});
+        send(shard, SendControlCommand{to.session, 0, tell->frame, 0, {}, true});
       }
       return;
     }

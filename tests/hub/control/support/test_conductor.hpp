@@ -70,10 +70,12 @@ class TestConductor {
   Node join(const proto::Hello& hello) {
     const auto refusal = try_join(hello);
     EXPECT_FALSE(refusal) << refusal->sentence;
-    const FakeShards::Sent& last = shards.sent.back();
-    const auto* attach = std::get_if<AttachCommand>(&last.command);
+    // Behind it come the paces of what the node is told with it.
+    auto last = shards.sent.rbegin();
+    while (std::holds_alternative<PaceCommand>(last->command)) ++last;
+    const auto* attach = std::get_if<AttachCommand>(&last->command);
     EXPECT_NE(attach, nullptr);
-    return Node{attach->node, last.shard, attach->session, attach->attachment, attach->welcome};
+    return Node{attach->node, last->shard, attach->session, attach->attachment, attach->welcome};
   }
   Node join(const std::string& name) {
     proto::Hello hello;

@@ -28,27 +28,32 @@ inline ServiceTerms odometry() {
   return terms;
 }
 
+/// The terms that a paced subscriber is held to now.
+inline std::string pace_text(const Services& services, const PaceDue& due) {
+  const Topic* topic = services.find_group(due.group);
+  const auto pace = topic != nullptr ? topic->pace_of(due.subscriber) : std::nullopt;
+  if (!pace) return "none";
+  return std::to_string(pace->window) + "/" + std::to_string(pace->depth) +
+         (topic->service->terms.retain ? " retained" : "") +
+         (topic->once_plain.contains(due.subscriber) ? ", once plain" : "");
+}
+
 /// Effects as short words, in order: "group 1", "moved robot/odom", "subscribers robot/odom".
-inline std::vector<std::string> words(const Effects& effects) {
+inline std::vector<std::string> words(const Effects& effects, const Services& services) {
   std::vector<std::string> result;
   for (const Effect& effect : effects) {
     if (const auto* group = std::get_if<GroupChanged>(&effect)) {
       result.push_back("group " + std::to_string(group->index.value()));
-    } else if (const auto* provider = std::get_if<ProviderChanged>(&effect)) {
-      result.push_back("provider of " + std::to_string(provider->index.value()));
     } else if (const auto* member = std::get_if<MemberChanged>(&effect)) {
       result.push_back("member " + std::to_string(member->subscriber.value()) + " of " +
                        std::to_string(member->group.value()));
     } else if (const auto* moved = std::get_if<ServiceMoved>(&effect)) {
-      result.push_back("moved " + moved->full_name);
+      result.push_back("moved " + moved->full_name + (moved->joins ? ", joins" : ""));
     } else if (const auto* change = std::get_if<SubscribersChanged>(&effect)) {
       result.push_back("subscribers " + change->full_name);
     } else if (const auto* pace = std::get_if<PaceDue>(&effect)) {
       result.push_back("pace " + std::to_string(pace->subscriber.value()) + " of " +
-                       std::to_string(pace->group.value()) + ": " +
-                       std::to_string(pace->terms.window) + "/" +
-                       std::to_string(pace->terms.depth) + (pace->retained ? " retained" : "") +
-                       (pace->was_plain ? ", once plain" : ""));
+                       std::to_string(pace->group.value()) + ": " + pace_text(services, *pace));
     } else if (const auto* ended = std::get_if<PaceEnded>(&effect)) {
       result.push_back("no pace " + std::to_string(ended->subscriber.value()) + " of " +
                        std::to_string(ended->group.value()));
@@ -82,7 +87,7 @@ class ServicesTest : public ::testing::Test {
     return done ? Status::done : done.error().status;
   }
   std::vector<std::string> take_words() {
-    std::vector<std::string> result = words(effects_);
+    std::vector<std::string> result = words(effects_, services_);
     effects_.clear();
     return result;
   }
