@@ -5,6 +5,7 @@
 #include <map>
 #include <utility>
 
+#include "base/clock.hpp"
 #include "base/ids.hpp"
 #include "tools/gimnet/session.hpp"
 
@@ -276,6 +277,10 @@ ExitCode show(ToolSession& session, const Outcome<Records>& found) {
 }
 
 constexpr Timeout kPatience{5000};
+/// The last frames of a link are confirmed with its keep-alive (250 ms), so counts of links that
+/// have just become idle agree a moment later.
+constexpr std::int64_t kSettledWithinNs = 1'000'000'000;
+constexpr std::int64_t kAskAgainAfterNs = 100'000'000;
 /// More hubs than any way has.
 constexpr std::size_t kWayMax = 64;
 
@@ -367,13 +372,19 @@ ExitCode run_graph(ToolSession& session) {
 }
 
 ExitCode run_status_of_all(ToolSession& session) {
-  const auto first = ask_all(session);
-  if (!first) return session.fail(first.failure());
-  const auto second = ask_all(session);
-  if (!second) return session.fail(second.failure());
-  const bool exact = links_agree(*first) && links_agree(*second);
-  session.output().write(session.options().json ? json_of(*second, exact)
-                                                : text_of(*second, exact, session.paint()));
+  auto members = ask_all(session);
+  bool exact = false;
+  const std::int64_t until = steady_now_ns() + kSettledWithinNs;
+  while (members && !exact) {
+    const bool agreed = links_agree(*members);
+    members = ask_all(session);
+    exact = members && agreed && links_agree(*members);
+    const std::int64_t next = steady_now_ns() + kAskAgainAfterNs;
+    if (!exact && (next > until || !session.stop().wait_until(next))) break;
+  }
+  if (!members) return session.fail(members.failure());
+  session.output().write(session.options().json ? json_of(*members, exact)
+                                                : text_of(*members, exact, session.paint()));
   return session.finish();
 }
 
