@@ -53,7 +53,7 @@ class Chain(unittest.TestCase):
         start_recv(self, self.hubs[0], "B")
         ping = run_gimnet(self.hubs[2], "ping", self.node_id(self.hubs[0], "B"), "-c", "3", "-i", "0", "--json")
         self.assertEqual(ping.code, 0, ping.err)
-        self.assertEqual(json.loads(ping.out)["received"], 3)
+        self.assertGreater(json.loads(ping.out)["min"], 0, ping.out)
 
     def test_a_node_that_is_not_there_is_reported_from_afar(self):
         sent = run_gimnet(self.hubs[2], "send", "1.77", data=b"hello\n")
@@ -74,6 +74,9 @@ class Chain(unittest.TestCase):
             self.hubs[1].process.popen.send_signal(signal.SIGKILL)
             self.hubs[1].process.wait()
             self.hubs[1] = self.hubs[1].again(self)
+            # It knows nothing of before: what it knows, its neighbours have told it.
+            linked(self.hubs[1], 1)
+            linked(self.hubs[1], 3)
             linked(self.hubs[0], 3)
             linked(self.hubs[2], 1)
             sent = run_gimnet(self.hubs[2], "send", there, data=b"after %d\n" % death)
@@ -96,14 +99,14 @@ class Chain(unittest.TestCase):
         self.assertEqual(run_gimnet(self.hubs[2], "send", "near", data=b"here\n").code, 0)
         self.assertEqual((near.wait(), near.out), (0, b"here\n"))
 
-    def test_a_slow_receiver_pauses_a_sender_behind_two_links(self):
+    def test_a_receiver_that_stands_still_loses_nothing_behind_two_links(self):
         receiver = start_recv(self, self.hubs[0], "B", "-n", "400")
         there = self.node_id(self.hubs[0], "B")
         os.kill(receiver.popen.pid, signal.SIGSTOP)
         lines = b"".join(b"%06d%s\n" % (number, b"y" * 60_000) for number in range(400))
         sender = start_gimnet(self, self.hubs[2], "send", there, stdin=subprocess.PIPE)
         sender.feed(lines)
-        wait_until(lambda: self.hubs[0].counter("pauses") > 0, "a PAUSE")
+        wait_until(lambda: self.hubs[0].status()["ledger"]["accepted"] > 10, "messages that wait for it")
         os.kill(receiver.popen.pid, signal.SIGCONT)
         self.assertEqual(sender.wait(), 0, sender.err)
         self.assertEqual((receiver.wait(), receiver.out == lines), (0, True), receiver.err)

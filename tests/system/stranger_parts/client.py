@@ -113,14 +113,15 @@ class Stranger:
         if self._exactly(8) != OPENING:
             raise ConnectionError("no hub")
 
-    def join(self, name="", role=0, token=b"", epoch=0, resume=False, frame_bytes=0, hub_epoch=0, taken=0, description=""):
+    def join(self, name="", role=0, token=b"", epoch=0, resume=False, frame_bytes=0, hub_epoch=0, taken=0, description="",
+             extra=b""):
         body = b""
         for key, kind, content in ((1, U8, role), (2, TEXT, name), (3, OPAQUE, token), (4, U64, epoch), (5, BOOL, resume),
                                    (6, U32, frame_bytes), (8, TEXT, description), (9, U64, hub_epoch), (10, U64, taken)):
             if content:
                 body += put(key, kind, content)
         self.socket.sendall(OPENING)
-        self.write(LINK, 0, struct.pack("<HH", HELLO, 0) + body, src=0)
+        self.write(LINK, 0, struct.pack("<HH", HELLO, 0) + body + extra, src=0)
         self.read_opening()
         got = self.read()
         seen.add(("LINK", HELLO))
