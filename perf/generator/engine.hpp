@@ -60,7 +60,7 @@ class Engine {
   void on_closed(Client& client);
 
   Wire& wire_;
-  const impair::Address address_;
+  const gimnet::net::HostAddress address_;
   const int epoll_;
   std::unique_ptr<std::byte[]> buffer_;
   std::vector<std::unique_ptr<Client>> clients_;

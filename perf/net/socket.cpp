@@ -11,12 +11,18 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <utility>
 
 namespace gimnet::perf {
 namespace {
 
-int make_socket(const impair::Address& address, int flags) {
-  const int made = ::socket(address.bytes.ss_family, SOCK_STREAM | SOCK_CLOEXEC | flags, 0);
+const sockaddr* system_address(const gimnet::net::HostAddress& address) {
+  return reinterpret_cast<const sockaddr*>(address.data());
+}
+
+int make_socket(const gimnet::net::HostAddress& address, int flags) {
+  const int made =
+      ::socket(system_address(address)->sa_family, SOCK_STREAM | SOCK_CLOEXEC | flags, 0);
   if (made < 0) fail("cannot make a socket", errno);
   return made;
 }
@@ -39,16 +45,19 @@ void tune(int socket, int send_buffer_bytes) {
   }
 }
 
-impair::Address address_of(const std::string& url) {
-  const Result<impair::Address> address = impair::find_address(url);
+gimnet::net::HostAddress address_of(const std::string& url) {
+  const auto address = gimnet::net::parse_address(url, 0);
   if (!address) fail(address.error().sentence);
-  return *address;
+  const gimnet::net::WakeSignal never;
+  auto found = gimnet::net::find_addresses(*address, gimnet::net::kNever, never);
+  if (!found) fail(found.error().sentence);
+  return std::move(found->front());
 }
 
-int connect_to(const impair::Address& address) {
+int connect_to(const gimnet::net::HostAddress& address) {
   const int socket = make_socket(address, 0);
   // Blocking: on a loopback the kernel completes it by itself, unless the backlog is full.
-  if (::connect(socket, address.get(), address.size) != 0)
+  if (::connect(socket, system_address(address), static_cast<socklen_t>(address.size())) != 0)
     fail("cannot connect to the subject", errno);
   tune(socket, 0);
   if (::fcntl(socket, F_SETFL, ::fcntl(socket, F_GETFL) | O_NONBLOCK) != 0)
@@ -57,9 +66,10 @@ int connect_to(const impair::Address& address) {
 }
 
 int listen_on(const std::string& url) {
-  const impair::Address address = address_of(url);
+  const gimnet::net::HostAddress address = address_of(url);
   const int listener = make_socket(address, SOCK_NONBLOCK);
-  if (::bind(listener, address.get(), address.size) != 0 || ::listen(listener, SOMAXCONN) != 0)
+  if (::bind(listener, system_address(address), static_cast<socklen_t>(address.size())) != 0 ||
+      ::listen(listener, SOMAXCONN) != 0)
     fail("cannot listen on " + url, errno);
   return listener;
 }

@@ -3,7 +3,9 @@
 #include <string>
 #include <string_view>
 
-#include "impair/address.hpp"
+#include "net/address.hpp"
+#include "net/host_lookup.hpp"
+#include "net/wait.hpp"
 
 // Sockets of the measuring programs. Every failure ends the program with a sentence: a measurement
 // that cannot be made has no result. Thread safety: none; one thread.
@@ -17,9 +19,9 @@ namespace gimnet::perf {
 // Addresses are as the hub prints them: `tcp://127.0.0.1:7450` or `unix:/path`.
 
 /// Ends the program when it is none.
-[[nodiscard]] impair::Address address_of(const std::string& url);
+[[nodiscard]] gimnet::net::HostAddress address_of(const std::string& url);
 /// A connected, non-blocking socket with TCP_NODELAY.
-[[nodiscard]] int connect_to(const impair::Address& address);
+[[nodiscard]] int connect_to(const gimnet::net::HostAddress& address);
 /// A listening, non-blocking socket with the longest backlog that the system allows.
 [[nodiscard]] int listen_on(const std::string& url);
 /// The address that a listening socket really has.

@@ -9,7 +9,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "protocol.md").read_text(encoding="utf-8")
 SECTION = re.search(r"^## Limits, timers and states\n(.*?)(?=^## )", PAGE, re.S | re.M)[1]
 # What no peer can tell from outside: turns, sockets, the log.
-UNSEEN = {"turn_bytes", "turn_deliveries", "socket_send_bytes", "unsent_ms", "unsent_bytes", "log_lines_per_s", "peer_log_lines_per_s"}
+UNSEEN = {"told_at_once", "turn_bytes", "turn_deliveries", "socket_send_bytes", "unsent_ms", "unsent_bytes", "log_lines_per_s", "peer_log_lines_per_s"}
 
 
 def number(text):

@@ -138,7 +138,7 @@ Work pauses(std::size_t count) {
   return [count] {
     nif::PauseTable table;
     for (std::uint32_t i = 0; i < count; ++i) {
-      table.pause({proto::Kind::unicast, proto::Lane::normal, i * kPlaces});
+      table.pause({proto::Kind::unicast, proto::Lane::normal, i * kPlaces}, 0);
       if (!table.is_paused(nif::stream_code(proto::Kind::unicast, 1, i * kPlaces)))
         wrong("it was paused");
     }

@@ -120,7 +120,8 @@ void SimNode::on_service_moved(Link& from, std::span<const std::byte> payload) {
   const Known now{event->group, event->provider};
   from.moved[event->name] = now;
   const auto subscribed = subscribes_.find(event->name);
-  if (subscribed == subscribes_.end()) return;
+  // An earlier connection, maybe to the hub before its restart, may be that slow.
+  if (subscribed == subscribes_.end() || !wire_ || &from != &link()) return;
   const GroupId former = std::exchange(subscribed->second.known, now).group;
   if (former != event->group) {
     from.taken.erase(former.value());

@@ -35,11 +35,10 @@ class Sending(unittest.TestCase):
         self.assertIn("there is no node 'bot/driv', and the node 'bot' has no service 'driv'; did you mean bot/drive?",
                       send.err)
 
-    def test_a_node_of_that_name_goes_first(self):
-        receiver = start_gimnet(self, self.hub, "recv", "--name", "bot/drive", "--raw", "-n", "1")
-        self.hub.wait_for_node("bot/drive")
-        send = run_gimnet(self.hub, "send", "bot/drive", data=b"one\n")
-        self.assertEqual((send.code, receiver.wait(), receiver.out), (0, 0, b"one\n"), send.err)
+    def test_no_node_gets_the_name_of_a_service(self):
+        refused = run_gimnet(self.hub, "recv", "--name", "bot/drive")
+        self.assertNotEqual(refused.code, 0)
+        self.assertIn("bot/drive", refused.err)
 
 
 class Accepting(unittest.TestCase):

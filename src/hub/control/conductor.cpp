@@ -53,14 +53,6 @@ std::uint64_t epoch_of(const HubStart& start) {
   return epoch != 0 ? epoch : 1;
 }
 
-/// Those whose ids were handed out before a restart, or may have been, wherever REASSIGN put them.
-void expect_all(const IndexSet& used, NodeTable& nodes) {
-  const std::size_t end = 8 * used.bytes().size();
-  for (std::uint32_t index = 1; index < end; ++index) {
-    if (used.contains(index)) nodes.expect(index);
-  }
-}
-
 }  // namespace
 
 Conductor::Conductor(HubFacts facts, Placement placement, Limits& limits, Wiring wiring)
@@ -87,7 +79,7 @@ Conductor::Conductor(HubFacts facts, Placement placement, Limits& limits, Wiring
     remote_requests_ =
         std::make_unique<RemoteRequests>(RemoteRequests::Parts{facts_, wiring_.shards, *links_});
   }
-  if (returns_published_) expect_all(wiring_.start.nodes.used, wiring_.tables.nodes);
+  if (returns_published_) publisher_.expect_all(wiring_.start.nodes.used);
 }
 
 std::optional<Goodbye> Conductor::admit(Stranger& stranger, const proto::Hello& hello,
@@ -248,9 +240,7 @@ HandlerContext Conductor::context_for(Effects& effects, milliseconds now) {
   HandlerContext context{facts_, limits_, membership_,      watches_,         wiring_.counters,
                          now,    effects, wiring_.sessions, wiring_.refusals, &request_counters_,
                          this};
-  if (links_ != nullptr) {
-    context.network = overview_.get();
-  }
+  context.network = overview_.get();
   context.names = &names_;
   return context;
 }

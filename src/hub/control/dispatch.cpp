@@ -81,7 +81,8 @@ bool may_be_asked_from_afar(Kind kind, std::uint16_t operation) {
   constexpr std::array kNames{ns::Resolve::kOperation, ns::Reverse::kOperation,
                               ns::List::kOperation, ns::Services::kOperation};
   constexpr std::array kAdmin{ctrl::HubInfo::kOperation, ctrl::Statistics::kOperation,
-                              ctrl::Connections::kOperation, ctrl::Routes::kOperation};
+                              ctrl::Connections::kOperation, ctrl::Hubs::kOperation,
+                              ctrl::Links::kOperation};
   const auto has = [operation](const auto& all) {
     return std::ranges::find(all, operation) != all.end();
   };

@@ -41,8 +41,7 @@ class EffectRunner {
   void carry_out(const Effects& effects, std::chrono::milliseconds now);
   /// The next piece of what nodes have yet to be told of services. True: there is more.
   [[nodiscard]] bool tell_rest();
-  /// Events for that connection were dropped, and its control queue is empty: the node is to be
-  /// told again.
+  /// Events for that connection were dropped, and its control queue is empty: tell the node again.
   void events_missed(const Session& session, std::uint32_t attachment);
   /// Sends an event of kind NS, which is dropped if the node does not take what it is told; nothing
   /// to a node that is away.

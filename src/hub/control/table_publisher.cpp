@@ -20,6 +20,13 @@ TablePublisher::~TablePublisher() {
     static_cast<void>(tables_.groups.exchange(index.value(), nullptr));
 }
 
+void TablePublisher::expect_all(const IndexSet& used) {
+  const std::size_t end = 8 * used.bytes().size();
+  for (std::uint32_t index = 1; index < end; ++index) {
+    if (used.contains(index)) tables_.nodes.expect(index);
+  }
+}
+
 void TablePublisher::publish_node(NodeIndex index, const Membership& membership) {
   const Session* session = membership.sessions().find(index);
   NodePlace place;

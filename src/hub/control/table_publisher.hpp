@@ -29,6 +29,9 @@ class TablePublisher {
   TablePublisher(const TablePublisher&) = delete;
   TablePublisher& operator=(const TablePublisher&) = delete;
 
+  /// Nodes whose ids were handed out before a restart, or may have been, wherever REASSIGN put
+  /// them.
+  void expect_all(const IndexSet& used);
   /// Publishes what `membership` says of the node now.
   void publish_node(NodeIndex index, const Membership& membership);
   /// Publishes who provides the group now, or that there is no such group any more. A new group has

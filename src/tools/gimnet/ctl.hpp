@@ -31,7 +31,7 @@ struct CtlOptions {
   std::optional<std::uint16_t> cost{};  ///< link add and link cost; 0: measured
 };
 
-/// What is wrong with the words of `gimnet ctl link`, or "".
+/// The fault in the words of `gimnet ctl link`, or "".
 [[nodiscard]] std::string link_fault(const CtlOptions& options);
 
 /// Declares `ctl` and its actions; `options` outlives the parsing.

@@ -1,6 +1,7 @@
 #include "hub/control/handle/network.hpp"
 
 #include <algorithm>
+#include <tuple>
 
 #include "proto/control/ctrl_network.hpp"
 
@@ -83,7 +84,9 @@ ctrl::LinkRecord record_of(const LinkView& link) {
 ctrl::LinksAnswer links(const HandlerContext& context, const ctrl::Links& wanted) {
   std::vector<LinkView> all;
   if (context.network != nullptr) all = context.network->links();
-  std::ranges::stable_sort(all, {}, &LinkView::name);
+  std::ranges::sort(all, [](const LinkView& a, const LinkView& b) {
+    return std::tie(a.name, a.hub, a.peer) < std::tie(b.name, b.hub, b.peer);
+  });
   ctrl::LinksAnswer answer;
   PageBudget budget(context.limits, wanted.records_max);
   for (std::size_t i = wanted.skip; i < all.size(); ++i) {
@@ -107,10 +110,10 @@ Changed<Message> changed(Status status, const std::string& why) {
   return ctrl::LinkChanged<Message>{};
 }
 
-const Refusal kAlone{Status::not_supported, "this hub can have no links to other hubs"};
+Refusal alone() { return {Status::not_supported, "this hub can have no links to other hubs"}; }
 
 Changed<ctrl::LinkAdd> add(HandlerContext& context, const ctrl::LinkAdd& wanted) {
-  if (context.network == nullptr) return kAlone;
+  if (context.network == nullptr) return alone();
   Result<DialledLink> link = make_link(wanted.url, wanted.name);
   if (!link) return Refusal{Status::bad_request, link.error().sentence};
   if (!context.facts.insecure && !is_local(link->address)) {
@@ -144,7 +147,7 @@ proto::Payload handle_link_add(HandlerContext& context, const Request& request) 
 proto::Payload handle_link_remove(HandlerContext& context, const Request& request) {
   return answer_to<ctrl::LinkRemove>(
       request, [&](const ctrl::LinkRemove& wanted) -> Changed<ctrl::LinkRemove> {
-        if (context.network == nullptr) return kAlone;
+        if (context.network == nullptr) return alone();
         return changed<ctrl::LinkRemove>(Status::not_found,
                                          context.network->remove_link(wanted.name));
       });
@@ -153,7 +156,7 @@ proto::Payload handle_link_remove(HandlerContext& context, const Request& reques
 proto::Payload handle_link_cost(HandlerContext& context, const Request& request) {
   return answer_to<ctrl::LinkCost>(
       request, [&](const ctrl::LinkCost& wanted) -> Changed<ctrl::LinkCost> {
-        if (context.network == nullptr) return kAlone;
+        if (context.network == nullptr) return alone();
         return changed<ctrl::LinkCost>(Status::not_found,
                                        context.network->set_link_cost(wanted.name, wanted.cost));
       });
