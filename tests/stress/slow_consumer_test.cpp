@@ -4,11 +4,10 @@
 #include <array>
 #include <cstring>
 #include <deque>
-#include <sstream>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "hub/limits.hpp"
 #include "tests/stress/support/hub_process.hpp"
 #include "tests/stress/support/raw_node.hpp"
 #include "tests/stress/support/statistics.hpp"
@@ -190,24 +189,13 @@ TEST(StoppedReceiver, IsClosedAsSlowThoughItsMessagesTimeOut) {
                 {proto::Policy::block, true, "slow_consumers", proto::GoodbyeCode::slow_consumer});
 }
 
-/// The default that `tcphub --help-limits` prints for a limit.
-std::uint64_t default_of(const std::string& name) {
-  std::istringstream lines(output_of_tcphub({"--help-limits"}));
-  for (std::string line; std::getline(lines, line);) {
-    std::istringstream words(line);
-    std::string first;
-    std::uint64_t value = 0;
-    if (words >> first >> value && first == name) return value;
-  }
-  throw std::runtime_error("no limit " + name);
-}
-
 TEST(StoppedReceiver, HasTheTimesThatTheDocumentsPromise) {
-  EXPECT_EQ(default_of("keep_alive_ms"), 1'000u);
-  EXPECT_EQ(default_of("silent_ms"), 3'000u);
-  EXPECT_EQ(default_of("slow_consumer_ms"), 10'000u);
-  EXPECT_EQ(default_of("slow_consumer_bytes"), 4'096u);
-  EXPECT_EQ(default_of("block_ms"), 5'000u);
+  const hub::Limits limits;
+  EXPECT_EQ(limits.keep_alive_ms, 1'000u);
+  EXPECT_EQ(limits.silent_ms, 3'000u);
+  EXPECT_EQ(limits.slow_consumer_ms, 10'000u);
+  EXPECT_EQ(limits.slow_consumer_bytes, 4'096u);
+  EXPECT_EQ(limits.block_ms, 5'000u);
 }
 
 }  // namespace
