@@ -40,6 +40,12 @@ ctrl::HubRecord record_of(const HandlerContext& context, const HubView& hub) {
                          .reachable = hub.reachable,
                          .too_far = hub.too_far,
                          .version = hub.version};
+  const NameCopies* names = context.names != nullptr ? context.names->copies() : nullptr;
+  if (names != nullptr) {
+    const NameIndex::Counts counts = names->counts_of(hub.hub);
+    record.nodes = counts.nodes;
+    record.services = counts.services;
+  }
   if (own) {
     record.nodes = static_cast<std::uint32_t>(context.membership.sessions().all().size());
     record.services = static_cast<std::uint32_t>(context.membership.services().provided());

@@ -138,6 +138,8 @@ class NameCopies {
   [[nodiscard]] std::uint64_t dropped_copies() const { return dropped_copies_; }
 
   [[nodiscard]] const HubRun& self() const { return options_.self; }
+  /// Names of that hub.
+  [[nodiscard]] NameIndex::Counts counts_of(HubId hub) const { return index_.counts_of(hub); }
   [[nodiscard]] std::size_t bytes() const { return index_.bytes(); }
   [[nodiscard]] std::size_t size() const { return index_.nodes().size() + index_.groups().size(); }
   /// Times that names of a hub were not taken since there was no room.

@@ -48,8 +48,10 @@ NameIndex::Place NameIndex::put(std::string_view name, HubId hub, const NameClai
   if (claim.state == NameState::deleted) return place;
   if (claim.service) {
     groups_[claim.service->group] = place;
+    ++counts_[hub_of(claim.node)].services;
   } else {
     nodes_[claim.node] = place;
+    ++counts_[hub_of(claim.node)].nodes;
   }
   return place;
 }
@@ -62,11 +64,15 @@ void NameIndex::erase(Place place) {
 
 void NameIndex::forget_id(const NameClaim& claim) {
   if (claim.state == NameState::deleted) return;
+  const auto counts = counts_.find(hub_of(claim.node));
   if (claim.service) {
     groups_.erase(claim.service->group);
+    --counts->second.services;
   } else {
     nodes_.erase(claim.node);
+    --counts->second.nodes;
   }
+  if (counts->second.nodes == 0 && counts->second.services == 0) counts_.erase(counts);
 }
 
 }  // namespace gimnet::hub

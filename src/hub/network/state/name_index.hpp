@@ -55,6 +55,15 @@ class NameIndex {
   }
   /// The living claim that has this one's node id, or its group id.
   [[nodiscard]] std::optional<Place> holder(const proto::route::NameClaim& claim) const;
+  struct Counts {
+    std::uint32_t nodes = 0;
+    std::uint32_t services = 0;
+  };
+  /// Living claims of a hub: its nodes that have a name, and its services.
+  [[nodiscard]] Counts counts_of(HubId hub) const {
+    const auto found = counts_.find(hub);
+    return found == counts_.end() ? Counts{} : found->second;
+  }
   /// All living claims of a hub.
   [[nodiscard]] std::vector<Place> live_of(HubId hub) const;
 
@@ -74,6 +83,7 @@ class NameIndex {
   mutable Claims claims_;  // find() gives places that may be changed
   std::map<NodeId, Place> nodes_;
   std::map<GroupId, Place> groups_;
+  std::map<HubId, Counts> counts_;
   std::size_t bytes_ = 0;
 };
 

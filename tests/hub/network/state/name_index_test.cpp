@@ -48,6 +48,20 @@ TEST(NameIndex, ForgetsTheIdOfAClaimThatWasReplacedOrErased) {
   EXPECT_EQ(index.bytes(), 0u);
 }
 
+TEST(NameIndex, CountsWhatEachHubHas) {
+  NameIndex index;
+  index.put("robot", HubId{2}, node_claim(2, 17, 1));
+  index.put("robot", HubId{2}, node_claim(2, 18, 2));
+  index.put("robot/laser", HubId{2}, service_claim(2, 1, 18, 3));
+  index.put("other", HubId{3}, node_claim(3, 1, 1));
+  EXPECT_EQ(index.counts_of(HubId{2}).nodes, 1u);
+  EXPECT_EQ(index.counts_of(HubId{2}).services, 1u);
+  EXPECT_EQ(index.counts_of(HubId{3}).nodes, 1u);
+  index.put("robot", HubId{2}, test::mark(4));
+  EXPECT_EQ(index.counts_of(HubId{2}).nodes, 0u);
+  EXPECT_EQ(index.counts_of(HubId{4}).nodes, 0u);
+}
+
 TEST(NameIndex, OfTwoClaimsTheSameOneWinsFromBothSides) {
   const auto low = node_claim(1, 5, 1);
   const auto high = node_claim(2, 5, 1);
