@@ -116,7 +116,8 @@ std::optional<NetError> await_answer(Stream& stream, DialHandshake& handshake,
                                      const WakeSignal& cancel) {
   std::array<std::byte, 4096> memory;
   for (;;) {
-    const IoResult result = stream.receive(memory);
+    const std::size_t most = std::min(memory.size(), handshake.missing());
+    const IoResult result = stream.receive(std::span(memory).first(most));
     if (result.status == IoStatus::closed || result.status == IoStatus::failed)
       return closed_early(address);
     if (result.status == IoStatus::would_block) {

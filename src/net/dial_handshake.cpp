@@ -42,6 +42,13 @@ DialHandshake::State DialHandshake::fail(Fault fault, std::string sentence) {
   return State::failed;
 }
 
+std::size_t DialHandshake::missing() const {
+  if (taken_ == 0) return proto::kOpeningSize - bytes_.size();
+  const std::size_t has = bytes_.size() - taken_;
+  if (has < proto::kHeaderSize) return proto::kHeaderSize - has;
+  return proto::load_header(bytes_.data() + taken_).frame_size() - has;
+}
+
 DialHandshake::State DialHandshake::take(std::span<const std::byte> bytes) {
   bytes_.insert(bytes_.end(), bytes.begin(), bytes.end());
   if (taken_ == 0) {

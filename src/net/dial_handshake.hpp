@@ -28,6 +28,10 @@ class DialHandshake {
   /// Bytes as they came. REQUIRES: the last call answered need_more, or there was none.
   [[nodiscard]] State take(std::span<const std::byte> bytes);
 
+  /// So many bytes at least are still to come. Who reads no more leaves what stands behind WELCOME
+  /// in the stream. REQUIRES: as take().
+  [[nodiscard]] std::size_t missing() const;
+
   /// After `welcome`.
   [[nodiscard]] const proto::Welcome& welcome() const { return welcome_; }
   /// After `welcome`: the bytes that came behind it.

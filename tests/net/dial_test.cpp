@@ -92,7 +92,7 @@ TEST(Dial, TellsThatAPathIsAFolder) {
   EXPECT_TRUE(refused.error().sentence.ends_with("as in unix:/tmp/tcphub.sock"));
 }
 
-TEST(DialHub, GivesTheWelcomeAndTheBytesBehindIt) {
+TEST(DialHub, GivesTheWelcomeAndLeavesTheBytesBehindIt) {
   proto::Welcome welcome;
   welcome.node = NodeId{17};
   welcome.name = "robot";
@@ -101,7 +101,10 @@ TEST(DialHub, GivesTheWelcomeAndTheBytesBehindIt) {
   const auto welcomed = dial_hub_that_says(answer);
   ASSERT_TRUE(welcomed);
   EXPECT_EQ(welcomed->welcome, welcome);
-  EXPECT_EQ(welcomed->rest, std::vector<std::byte>{std::byte{7}});
+  EXPECT_TRUE(welcomed->rest.empty());
+  std::byte left{};
+  ASSERT_EQ(welcomed->stream->receive({&left, 1}).bytes, 1u);
+  EXPECT_EQ(left, std::byte{7});
 }
 
 TEST(DialHub, GivesTheReasonOfAHubThatRefuses) {

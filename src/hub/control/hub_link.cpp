@@ -34,6 +34,13 @@ HubIdentity HubLink::identity() const {
   return {peer_->hub, peer_->instance, peer_->configured};
 }
 
+std::string HubLink::title() const {
+  GIMNET_CHECK(peer_.has_value());
+  const std::string& name = peer_->hub_name;
+  return "hub " + std::to_string(peer_->hub.hub.value()) +
+         (name.empty() ? std::string{} : " '" + name + "'");
+}
+
 void HubLink::begin_connection(const proto::HubIntroduction& said, const LinkTerms& own,
                                milliseconds now) {
   const bool same = peer_ && peer_->hub == said.hub && peer_->instance == said.instance;
@@ -45,8 +52,10 @@ void HubLink::begin_connection(const proto::HubIntroduction& said, const LinkTer
   silent_ms_ = std::max(own.silent_ms, said.silent_ms);
   keep_alive_at_ = heard_at_ = now;
   heard_sent_ns_ = heard_ns_ = 0;
-  clock_ = {};
-  cost_ = cost_of(is_dialled() ? dialled_->cost : said.cost);
+  if (!same || !resume_until_) {
+    clock_ = {};
+    cost_ = cost_of(is_dialled() ? dialled_->cost : said.cost);
+  }
   resume_until_.reset();
   dial_at_.reset();
   backoff_.reset();

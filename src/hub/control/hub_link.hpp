@@ -50,6 +50,8 @@ class HubLink {
   /// The other end, as HELLO or WELCOME said; of before the first connection: nothing.
   [[nodiscard]] const std::optional<proto::HubIntroduction>& peer() const { return peer_; }
   [[nodiscard]] HubIdentity identity() const;
+  /// The other end as the log names it: "hub 7 'lab'". REQUIRES: peer().
+  [[nodiscard]] std::string title() const;
 
   /// A connection begins. `said` is what the other end said, `own` this end's terms.
   void begin_connection(const proto::HubIntroduction& said, const LinkTerms& own,
@@ -64,6 +66,7 @@ class HubLink {
   /// Its time to come back is over.
   void give_up() { resume_until_.reset(); }
   [[nodiscard]] std::uint32_t silent_ms() const { return silent_ms_; }
+  [[nodiscard]] std::uint32_t keep_alive_ms() const { return keep_alive_ms_; }
   [[nodiscard]] std::optional<std::chrono::milliseconds> damped_until() const {
     return damped_until_;
   }
@@ -78,9 +81,7 @@ class HubLink {
   [[nodiscard]] bool hear_keep_alive(const proto::route::KeepAlive& heard,
                                      std::chrono::milliseconds now, std::int64_t wall_ns);
   [[nodiscard]] std::chrono::milliseconds heard_at() const { return heard_at_; }
-  [[nodiscard]] std::uint16_t cost() const {
-    return cost_.value().value_or(LinkCost::kLeastMeasured);
-  }
+  [[nodiscard]] std::uint16_t cost() const { return cost_.value().value_or(LinkCost::kUnmeasured); }
   [[nodiscard]] const LinkClock& clock() const { return clock_; }
 
   // Dialling. REQUIRES: is_dialled().
@@ -97,8 +98,9 @@ class HubLink {
   std::uint32_t attachment = 0;  ///< numbers its connections
   std::string address;           ///< of the other end
   std::string last_error;
-  bool exchange_begun = false;  ///< on this connection
-  std::uint64_t epoch = 0;      ///< of this end; 0: the link cannot be resumed
+  bool exchange_begun = false;   ///< on this connection
+  std::uint64_t epoch = 0;       ///< of this end; 0: the link cannot be resumed
+  std::uint64_t said_epoch = 0;  ///< in the HELLO that is under way
   std::uint64_t peer_epoch = 0;
   std::uint64_t taken = 0;  ///< data frames of the last connection
 

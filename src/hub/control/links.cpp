@@ -15,11 +15,6 @@ using proto::Goodbye;
 using proto::GoodbyeCode;
 using std::chrono::milliseconds;
 
-std::string hub_title(const proto::HubIntroduction& hub) {
-  return "hub " + std::to_string(hub.hub.hub.value()) +
-         (hub.hub_name.empty() ? std::string{} : " '" + hub.hub_name + "'");
-}
-
 /// A connection that nobody meant to end: it may be resumed.
 bool is_break(const DetachedEvent& event) {
   return event.code == GoodbyeCode::silent ||
@@ -85,7 +80,7 @@ std::optional<Goodbye> Links::judge(const proto::HubIntroduction& said, Moment m
   HubLink* old = find(answer.old_link);
   if (old == nullptr) return std::nullopt;
   const bool alive =
-      old->connected() && moment.now - old->heard_at() < milliseconds{2 * kLinkKeepAliveMs};
+      old->connected() && moment.now - old->heard_at() < milliseconds{2 * old->keep_alive_ms()};
   if (alive) return handshake_.refusal_of(said, answer);
   close(*old, GoodbyeCode::replaced, "the hub started again");
   end_connection(*old, true, moment);
@@ -100,6 +95,7 @@ void Links::dial_due(HubLink& link, Moment moment) {
     link.epoch = wiring_.random() | 1;  // 0: none
     link.peer_epoch = link.taken = 0;
   }
+  link.said_epoch = link.epoch;
   wiring_.dial(link.number(), link.dialled(), handshake_.hello_for(link));
 }
 
@@ -126,6 +122,9 @@ void Links::on_dialled(LinkNumber number, Result<net::Welcomed, net::NetError> o
   if (!welcome.introduction)
     return refuse({GoodbyeCode::malformed, "the peer's WELCOME is not one for a hub"});
   if (const auto refused = judge(*welcome.introduction, moment)) return refuse(*refused);
+  // The other end counts on, and this one cannot: both begin anew.
+  if (welcome.resumed && !link->place) return fail("it came back too late to be resumed", false);
+  link->epoch = link->said_epoch;
   AttachCommand command;
   command.transport = std::move(outcome->stream);
   command.resume_wanted = true;
@@ -165,7 +164,7 @@ void Links::attach(HubLink& link, AttachCommand command, const proto::HubIntrodu
   wiring_.shards.send(link.place->shard, std::move(command));
   log_line(LogLevel::info, {"link", link.name()},
            std::string{again ? "linked again" : "linked"} + (link.is_dialled() ? " to " : " by ") +
-               hub_title(said) + ", " + link.address + ", link " + link.name());
+               link.title() + ", " + link.address + ", link " + link.name());
 }
 
 /// The side that dialled begins: what a refused attempt costs is a HELLO.
@@ -220,7 +219,7 @@ void Links::on_detached(const DetachedEvent& event, Moment moment) {
                                 (event.sentence.empty() ? "" : ": ") + event.sentence
                           : "the connection broke";
   log_line(LogLevel::warning, {"link", link->name()},
-           "link " + link->name() + " to " + hub_title(*link->peer()) + ": " + link->last_error);
+           "link " + link->name() + " to " + link->title() + ": " + link->last_error);
   end_connection(*link, !is_break(event), moment);
   advance(moment);
 }
@@ -358,7 +357,7 @@ HubLink* Links::find(const SessionRef& session) {
 }
 
 std::string Links::add(const DialledLink& link) {
-  if (find(link.name) != nullptr)
+  if (const HubLink* known = find(link.name); known != nullptr && known->is_dialled())
     return "there is a link '" + link.name + "' already; give another name";
   if (links_.size() >= kLinksMax) return "this hub has as many links as there can be";
   const LinkNumber number{++last_number_};
@@ -370,6 +369,7 @@ std::string Links::add(const DialledLink& link) {
 std::string Links::remove(std::string_view name) {
   HubLink* const link = find(name);
   if (link == nullptr) return "there is no link '" + std::string{name} + "'; see gimnet links";
+  if (!link->is_dialled()) return "the other side dials that link; remove it there";
   close(*link, GoodbyeCode::done, "the link was removed");
   withdraw(*link);
   links_.erase(link->number());
@@ -386,11 +386,15 @@ std::string Links::set_cost(std::string_view name, std::uint16_t cost) {
   return {};
 }
 
+/// Dialled links go first: the other side chose the names of accepted ones.
 HubLink* Links::find(std::string_view name) {
+  HubLink* accepted = nullptr;
   for (const auto& [number, link] : links_) {
-    if (link->name() == name) return link.get();
+    if (link->name() != name) continue;
+    if (link->is_dialled()) return link.get();
+    accepted = link.get();
   }
-  return nullptr;
+  return accepted;
 }
 
 }  // namespace gimnet::hub

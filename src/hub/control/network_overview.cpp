@@ -1,6 +1,7 @@
 #include "hub/control/network_overview.hpp"
 
 #include <algorithm>
+#include <set>
 
 namespace gimnet::hub {
 namespace {
@@ -46,9 +47,12 @@ std::vector<HubView> NetworkOverview::hubs() const {
     hubs.push_back(std::move(hub));
   }
   const auto& reachable = parts_.links.network().map().reachable();
+  std::set<HubId> shown;
+  for (const HubView& hub : hubs) shown.insert(hub.hub);
   for (const auto& [key, record] : store.records()) {
-    if (record.head() != nullptr && !std::ranges::binary_search(reachable, key))
-      hubs.push_back(view(key));
+    // A hub that lost its state, or its id, leaves a record behind: each id is shown once.
+    if (record.head() == nullptr || std::ranges::binary_search(reachable, key)) continue;
+    if (shown.insert(key.hub).second) hubs.push_back(view(key));
   }
   std::sort(hubs.begin() + 1, hubs.end(),
             [](const HubView& a, const HubView& b) { return a.hub < b.hub; });

@@ -40,6 +40,7 @@ class NextHops {
     SendControlCommand command;
     command.session = {next.link.slot, next.link.generation};
     command.frame = std::move(frame);
+    command.passed_on = true;
     shards_.send(next.link.shard, std::move(command));
     return true;
   }

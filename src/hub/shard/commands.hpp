@@ -107,6 +107,7 @@ struct SendControlCommand {
   std::uint32_t answers = 0;
   std::optional<CountsBegin> counts{};  ///< that begin with the frame
   bool may_drop = false;
+  bool passed_on = false;  ///< over a link, of somebody else: dropped where it has no room
 };
 
 /// One event for many sessions of a shard, encoded once: each gets it as by a SendControlCommand

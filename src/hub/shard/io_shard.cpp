@@ -245,6 +245,7 @@ void IoShard::execute(ShardCommand& command) {
                    if (control.counts)
                      state_.pacer.begin_counts(*connection, control.counts->group,
                                                control.counts->number);
+                   if (control.passed_on) return pass_on(*connection, control.frame);
                    if (control.may_drop) return say_event(*connection, control.frame);
                    say(*connection, control.frame);
                  },
@@ -277,6 +278,12 @@ void IoShard::execute(ShardCommand& command) {
                  [&](StopCommand&) { stopped_ = true; },
              },
              command);
+}
+
+void IoShard::pass_on(Connection& connection, std::span<const std::byte> frame) {
+  if (connection.outbox.push_control(frame, state_.egress))
+    return state_.recipients.mark_dirty(connection);
+  state_.counters.too_many_requests.add(1);
 }
 
 void IoShard::say(Connection& connection, std::span<const std::byte> frame) {

@@ -64,8 +64,7 @@ bool Reader::handle_from_link(Connection& connection, const proto::RunView& view
       }
       return true;
     case Admission::report:
-      if (view.size <= proto::kHeaderSize + proto::kReportSizeMax)
-        state_.signals.pass_on({const_cast<std::byte*>(view.bytes), view.size});
+      pass_on_report(connection, view);
       return true;
     case Admission::wrong_source:
       state_.counters.wrong_source.add(view.frames);
@@ -93,6 +92,19 @@ void Reader::drop_from_link(Connection& connection, const proto::RunView& view,
   } else {
     state_.tally.drop(reason, view.frames);
   }
+}
+
+/// It counts its hop, and never goes back to the hub that it came from.
+void Reader::pass_on_report(Connection& connection, const proto::RunView& view) {
+  const proto::FrameHeader header = proto::load_header(view.bytes);
+  const HubId to = hub_of(NodeId{header.dst});
+  const bool back =
+      to != state_.shared.hub && state_.shared.routes.find(to).neighbour == hub_of(connection.node);
+  const bool too_large = view.size > proto::kHeaderSize + proto::kReportSizeMax;
+  if (back || too_large || header.hops >= proto::kHopsMax) return;
+  auto* bytes = const_cast<std::byte*>(view.bytes);
+  bytes[proto::kHopsOffset] = static_cast<std::byte>(header.hops + 1);
+  state_.signals.pass_on({bytes, view.size});
 }
 
 /// PAUSE or RESUME on its way to a sender. Only the next hop towards the destination may say it.

@@ -69,6 +69,7 @@ class Reader {
   /// Frames of a link that are not routed. False: the connection was closed.
   [[nodiscard]] bool handle_from_link(Connection& connection, const proto::RunView& view,
                                       Admission admission);
+  void pass_on_report(Connection& connection, const proto::RunView& view);
   void pass_on_flow(Connection& connection, const proto::RunView& view);
   void drop_from_link(Connection& connection, const proto::RunView& view, proto::DropReason reason);
   void route(Connection& connection, const proto::NextRun& found);

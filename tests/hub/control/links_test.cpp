@@ -71,6 +71,23 @@ TEST(Links, ALinkThatComesBackSaysWhatItHadTaken) {
   EXPECT_TRUE(hubs.b.routes.find(kA).exists()) << "frames wait meanwhile";
 }
 
+TEST(Links, OneThatCameBackTooLateBeginsAnewAtBothEnds) {
+  LinkedRigs hubs;
+  hubs.link();
+  hubs.b.detach(hubs.b.attached());
+  hubs.b.pass(milliseconds{50});
+  const LinkRig::Dialled late = hubs.b.dialled.back();
+  hubs.b.pass(HubLink::kResumeTime);
+  proto::Welcome welcome = hubs.a.attached().welcome;
+  welcome.resumed = true;
+  const std::size_t attached = hubs.b.shards.all<AttachCommand>().size();
+  hubs.b.links.on_dialled(late.link, net::Welcomed{std::make_unique<NoStream>(), welcome, {}},
+                          hubs.b.moment());
+  EXPECT_EQ(hubs.b.shards.all<AttachCommand>().size(), attached) << "the other end counts on";
+  hubs.b.pass(milliseconds{1'000});
+  EXPECT_EQ(hubs.b.dialled.back().hello.resume_epoch, 0u);
+}
+
 TEST(Links, OnlyAHubThatSaysSoTakesThem) {
   LinkRig hub(1, {});
   proto::Hello hello;

@@ -1,6 +1,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "tests/hub/shard/support/hub_rig.hpp"
 
 // Frames that come over links, and go over them.
@@ -123,6 +125,51 @@ TEST(LinkReader, AFrameThatIsNotUnderstoodIsDroppedAndTheLinkStays) {
   EXPECT_FALSE(link.goodbye);
   EXPECT_EQ(rig.dropped(DropReason::malformed), 2u) << "a kind that nobody knows is no data";
   EXPECT_TRUE(rig.ledger().exact());
+}
+
+TEST(LinkReader, AFrameWithoutRoomForItsKeyIsDroppedAlone) {
+  HubRig rig;
+  FakeNode& node = rig.join(0);
+  FakeNode& link = rig.link(0, kNear);
+  rig.write(link, frame_after(0, node.id.value(), "no key", {.flags = proto::kFlagKeyed}));
+  rig.write(link, frame_after(0, node.id.value(), "good"));
+  rig.settle();
+  EXPECT_THAT(node.texts(), ElementsAre("good"));
+  EXPECT_EQ(rig.dropped(DropReason::malformed), 1u);
+  EXPECT_FALSE(link.goodbye);
+}
+
+TEST(LinkReader, AReportNeverGoesBack) {
+  HubRig rig;
+  FakeNode& link = rig.link(0, kNear);
+  FakeNode& far = rig.link(0, kFar);
+  const auto report = [&](std::uint32_t to) {
+    rig.write(link, frame_after(3, to, "words", {.kind = Kind::report}));
+    rig.settle();
+  };
+  const auto reports = [](const FakeNode& node) {
+    return std::ranges::count(node.kinds, Kind::report);
+  };
+  report(make_id<NodeId>(kNear, 1).value());
+  EXPECT_EQ(reports(link), 0);
+  report(make_id<NodeId>(kFar, 1).value());
+  ASSERT_EQ(reports(far), 1);
+  EXPECT_EQ(far.control.back().header.hops, 4);
+}
+
+TEST(LinkReader, InventedSendersOfBlockUseUpNoMoreThanTheReserves) {
+  HubRig rig;
+  FakeNode& node = rig.join(0);
+  FakeNode& link = rig.link(0, kNear);
+  node.pipe.set_room(10);
+  const std::string big(60'000, 'x');
+  for (std::uint32_t i = 0; i < 1'000; ++i) {
+    rig.write(link, frame_after(0, node.id.value(), big, {.flags = 1},
+                                make_id<NodeId>(kNear, i + 1).value()));
+  }
+  rig.settle_without_reading();
+  EXPECT_GT(rig.dropped(DropReason::queue_full), 0u);
+  EXPECT_EQ(rig.dropped(DropReason::over_budget), 0u) << "others have their memory";
 }
 
 TEST(LinkReader, PauseGoesToTheSenderBehindTheLink) {

@@ -146,6 +146,10 @@ void Outbox::admit_to_full(Entry entry, const proto::FrameHeader& header, Egress
   lose_for_room(entry, lane_index, proto::DropReason::queue_full, context);
 }
 
+/// Senders of other hubs that one outbox pauses. More of them are dropped once the reserves are
+/// used up.
+constexpr std::size_t kPausedAfarMost = 4'096;
+
 bool Outbox::ask_to_pause(const Entry& entry, const proto::FrameHeader& header,
                           EgressContext& context) {
   const std::size_t lane = header.lane & proto::kLaneMask;
@@ -161,15 +165,20 @@ bool Outbox::ask_to_pause(const Entry& entry, const proto::FrameHeader& header,
     bytes = std::max(bytes, beyond(held_bytes() + entry.size, share));
     reserve = std::min(reserve, share);
   }
-  const std::uint64_t since_held = lanes_->pauses.on_full(
-      NodeId{header.src}, {header.kind, static_cast<proto::Lane>(lane), header.dst}, entry.size,
-      bytes > reserve, context.signals);
+  // A link is always read, so nobody behind it can be held; and it may name any source.
+  const bool afar = hub_of(NodeId{header.src}) != context.hub;
+  std::uint64_t since_held = 0;
+  if (!afar || lanes_->pauses.size() < kPausedAfarMost) {
+    since_held = lanes_->pauses.on_full(NodeId{header.src},
+                                        {header.kind, static_cast<proto::Lane>(lane), header.dst},
+                                        entry.size, bytes > reserve, context.signals);
+  }
   // Many senders may come at once: each is held, and loses nothing. What one of them had under way
   // by then was in its shard's mailbox to this one, or came with the reads before its shard heard
   // of the hold.
   const std::uint64_t reserves = kReservesMax * reserve;
   const bool comes_though_held = since_held > limits.mailbox_bytes + limits.turn_bytes + reserves;
-  return !comes_though_held || bytes <= reserves;
+  return (!comes_though_held && !afar) || bytes <= reserves;
 }
 
 /// Drops waiting entries until the new one fits, each of the source that has the most bytes. Where

@@ -13,6 +13,7 @@ namespace gimnet::hub {
 class PauseBook {
  public:
   [[nodiscard]] bool empty() const { return notes_.empty(); }
+  [[nodiscard]] std::size_t size() const { return notes_.size(); }
 
   /// A frame with BLOCK of `bytes` came although its lane is full. Returns the bytes that came from
   /// its sender for that target since it was held, this frame included; 0: it is not held.

@@ -71,7 +71,11 @@ Admission IngressGate::check_parts(IngressState& state, const proto::FrameHeader
                                    proto::RunView& view, proto::Origin origin) {
   if (proto::may_form_run(header)) {
     if (header.has(proto::kFlagKeyed)) keep_frames_with_key(view);
-    return view.frames != 0 ? Admission::data : refuse(state, proto::FrameError::key_too_short);
+    if (view.frames != 0) return Admission::data;
+    // That frame alone: a link goes on behind it.
+    view.size = view.last_bytes = static_cast<std::uint32_t>(header.frame_size());
+    view.frames = 1;
+    return refuse(state, proto::FrameError::key_too_short);
   }
   const auto frame = proto::parse_frame({view.bytes, view.size}, origin);
   return frame ? Admission::data : refuse(state, frame.error());

@@ -13,6 +13,8 @@ namespace gimnet::hub {
 class LinkCost {
  public:
   static constexpr std::uint16_t kLeastMeasured = 10;
+  /// Until then a link costs as much as one of a second: measured ones go first.
+  static constexpr std::uint16_t kUnmeasured = kLeastMeasured + 1'000;
   static constexpr std::uint16_t kMost = 65'535;
 
   LinkCost() = default;

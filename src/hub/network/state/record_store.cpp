@@ -75,6 +75,13 @@ void HubRecord::put(PartRef part) {
 RecordStore::Taken RecordStore::take(const PartRef& part, std::chrono::milliseconds now) {
   const RecordPart& said = part->said;
   auto found = records_.find(said.hub);
+  const StoredPart* before = found == records_.end() ? nullptr : found->second.part(said.part);
+  if (before != nullptr && !is_newer(said, before->said)) return Taken::known;
+  const std::size_t freed = before == nullptr ? 0 : before->bytes.size();
+  if (bytes_ - freed + part->bytes.size() > kBytesMax) {
+    ++too_many_;
+    return Taken::too_many;
+  }
   if (found == records_.end()) {
     if (!has_room_for(said.hub.hub)) {
       ++too_many_;
@@ -82,9 +89,8 @@ RecordStore::Taken RecordStore::take(const PartRef& part, std::chrono::milliseco
     }
     found = records_.try_emplace(said.hub).first;
     found->second.unreachable_since = now;
-  } else if (const StoredPart* known = found->second.part(said.part)) {
-    if (!is_newer(said, known->said)) return Taken::known;
   }
+  bytes_ += part->bytes.size() - freed;
   found->second.put(part);
   return Taken::newer;
 }
@@ -123,9 +129,11 @@ void RecordStore::set_reachable(std::span<const proto::HubKey> hubs,
 }
 
 void RecordStore::forget(std::chrono::milliseconds now) {
-  std::erase_if(records_, [now](const auto& entry) {
+  std::erase_if(records_, [now, this](const auto& entry) {
     const auto& since = entry.second.unreachable_since;
-    return since && now - *since >= kForgetAfter;
+    if (!since || now - *since < kForgetAfter) return false;
+    for (const PartRef& part : entry.second.parts()) bytes_ -= part->bytes.size();
+    return true;
   });
 }
 

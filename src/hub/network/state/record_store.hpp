@@ -67,6 +67,8 @@ class RecordStore {
  public:
   /// A hub that lost its state so many times within ten minutes is not known under a new unique id.
   static constexpr std::size_t kRecordsOfOneId = 64;
+  /// All parts of all other hubs, in bytes: five times what 4,000 hubs in a star say.
+  static constexpr std::size_t kBytesMax = 32 * 1024 * 1024;
   /// A hub that comes back later begins anew.
   static constexpr std::chrono::milliseconds kForgetAfter = std::chrono::minutes(10);
 
@@ -87,13 +89,14 @@ class RecordStore {
 
   /// Of all parts that count of all hubs that can be reached. Equal records give equal digests.
   [[nodiscard]] std::uint64_t digest() const;
-  /// Parts that were not taken because of kRecordsOfOneId.
+  /// Parts that were not taken because of kRecordsOfOneId or kBytesMax.
   [[nodiscard]] std::uint64_t too_many() const { return too_many_; }
 
  private:
   [[nodiscard]] bool has_room_for(HubId hub) const;
 
   std::map<proto::HubKey, HubRecord> records_;  ///< Limit: kRecordsOfOneId for each hub id
+  std::size_t bytes_ = 0;                       ///< of the parts of other hubs
   std::uint64_t too_many_ = 0;
 };
 

@@ -43,7 +43,8 @@ class EgressRig {
         pool(static_cast<std::uint32_t>(limits.frame_bytes), lease),
         pieces(lease),
         drops(tally, limits.report_interval_ms, limits.reports),
-        context{limits, pool, pieces, lease, tally, drops, signals, 1'000'000, 1'000'000'000} {}
+        context{limits, pool,    pieces,    lease,         tally,
+                drops,  signals, 1'000'000, 1'000'000'000, HubId{7}} {}
 
   static std::vector<std::byte> bytes(const std::string& payload, const TestFrame& frame = {}) {
     proto::FrameHeader header;
