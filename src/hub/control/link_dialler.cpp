@@ -35,6 +35,13 @@ LinkDialler::~LinkDialler() {
 
 void LinkDialler::dial(LinkNumber link, const DialledLink& to, const proto::Hello& hello,
                        const net::SocketOptions& options) {
+  if (!to.proxy.empty()) {
+    // Never past a proxy that somebody asked for.
+    return end(link, net::NetError(net::Fault::bad_address,
+                                   "this version cannot dial through a proxy: remove `proxy` and "
+                                   "GIMNET_PROXY, and use a tunnel (docs/operations.md, 'Crossing "
+                                   "a network')"));
+  }
   Attempt& attempt = attempts_.emplace_back();
   attempt.link = link;
   try {
@@ -44,21 +51,23 @@ void LinkDialler::dial(LinkNumber link, const DialledLink& to, const proto::Hell
     });
   } catch (const std::system_error& error) {
     attempts_.pop_back();
-    const std::lock_guard lock(mutex_);
-    ended_.emplace_back(link,
-                        net::NetError(net::Fault::no_memory,
-                                      std::string{"no thread to dial with: "} + error.what()));
-    waker_.wake();
+    end(link, net::NetError(net::Fault::no_memory,
+                            std::string{"no thread to dial with: "} + error.what()));
   }
 }
 
-void LinkDialler::note(Attempt& attempt, Outcome outcome) {
+void LinkDialler::end(LinkNumber link, Outcome outcome) {
   {
     const std::lock_guard lock(mutex_);
-    ended_.emplace_back(attempt.link, std::move(outcome));
+    ended_.emplace_back(link, std::move(outcome));
   }
-  attempt.ended.store(true, std::memory_order_release);  // pairs with the acquire in take_ended()
   waker_.wake();
+}
+
+void LinkDialler::note(Attempt& attempt, Outcome outcome) {
+  // First, so that who is woken joins this thread.
+  attempt.ended.store(true, std::memory_order_release);  // pairs with the acquire in take_ended()
+  end(attempt.link, std::move(outcome));
 }
 
 std::vector<std::pair<LinkNumber, LinkDialler::Outcome>> LinkDialler::take_ended() {

@@ -42,6 +42,7 @@ class LinkDialler {
     std::thread thread;
     std::atomic<bool> ended{false};
   };
+  void end(LinkNumber link, Outcome outcome);
   void note(Attempt& attempt, Outcome outcome);
 
   net::WakeSignal cancel_;

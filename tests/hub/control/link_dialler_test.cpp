@@ -38,6 +38,17 @@ TEST(LinkDialler, TellsWhyNobodyAnswers) {
   EXPECT_NE(ended[0].second.error().sentence.find("/nowhere/at/all.sock"), std::string::npos);
 }
 
+TEST(LinkDialler, DialsNobodyPastAProxy) {
+  LinkDialler dialler;
+  DialledLink link = to_nobody();
+  link.proxy = "http://proxy:3128";
+  dialler.dial(LinkNumber{4}, link, {}, {});
+  auto ended = wait(dialler);
+  ASSERT_EQ(ended.size(), 1u);
+  ASSERT_FALSE(ended[0].second);
+  EXPECT_NE(ended[0].second.error().sentence.find("proxy"), std::string::npos);
+}
+
 TEST(LinkDialler, EndsWithAttemptsUnderWay) {
   LinkDialler dialler;
   for (std::uint32_t i = 1; i <= 10; ++i) dialler.dial(LinkNumber{i}, to_nobody(), {}, {});
