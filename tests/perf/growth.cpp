@@ -20,7 +20,7 @@
 
 #include "client/gimi/clerk.hpp"
 #include "client/nif/name_cache.hpp"
-#include "client/nif/pause_table.hpp"
+#include "client/nif/outbound.hpp"
 #include "hub/control/state/directory.hpp"
 #include "hub/control/state/listing.hpp"
 #include "hub/control/state/membership.hpp"

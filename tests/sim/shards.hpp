@@ -14,7 +14,7 @@
 #include "hub/data/fanout/recipient.hpp"
 #include "hub/data/tables/group_table.hpp"
 #include "hub/data/tables/node_table.hpp"
-#include "hub/shard/connection_state.hpp"
+#include "hub/shard/connection.hpp"
 #include "proto/frame/frame_header.hpp"
 #include "tests/sim/checker.hpp"
 #include "tests/sim/network.hpp"

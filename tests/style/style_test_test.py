@@ -206,6 +206,17 @@ CASES = {
         [{"src/a.cpp": "int todos;\n"}],
         [{"src/a.cpp": "// TODO: more\n"}, {"perf/a.py": "# good enough for now\n"}],
     ),
+    rules.small_headers_are_shared: (
+        [
+            {"src/a.hpp": "int a;\n" * 40, "src/b.cpp": '#include "a.hpp"\n'},
+            {"src/a.hpp": "int a;\n" * 20, "src/a.cpp": "int b;\n" * 20, "src/b.cpp": '#include "a.hpp"\n'},
+            {"src/a.hpp": ""} | {f"src/{name}.cpp": '#include "a.hpp"\n' for name in "bcd"},
+        ],
+        [
+            {"src/a.hpp": "int a;\n" * 39, "src/b.cpp": '#include "a.hpp"\n', "src/c.cpp": '#include "a.hpp"\n'},
+            {"src/a.hpp": ""} | {f"src/{name}.cpp": '#include "a.hpp"\n' for name in "abc"},
+        ],
+    ),
     rules.tests_mirror_sources: (
         [
             {"src/base/a.cpp": "", "tests/base/a_test.cpp": ""},

@@ -3,8 +3,6 @@
 #include <array>
 #include <cstring>
 
-#include "base/cut_text.hpp"
-
 namespace gimnet::nif {
 namespace {
 

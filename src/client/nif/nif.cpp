@@ -3,8 +3,8 @@
 #include <cstring>
 #include <string>
 
-#include "base/cut_text.hpp"
 #include "client/nif/api.hpp"
+#include "client/nif/error.hpp"
 #include "client/nif/outgoing.hpp"
 #include "client/nif/sized_struct.hpp"
 
@@ -66,7 +66,7 @@ size_t nif_last_error(nif_node* node, char* buffer, size_t size) {
     const std::string sentence = found.last_error();
     length = sentence.size();
     if (buffer == nullptr || size == 0) return NIF_OK;
-    const std::string_view kept = gimnet::cut_text(sentence, size - 1);
+    const std::string_view kept = gimnet::nif::cut_text(sentence, size - 1);
     std::memcpy(buffer, kept.data(), kept.size());
     buffer[kept.size()] = '\0';
     return NIF_OK;

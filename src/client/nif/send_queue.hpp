@@ -10,7 +10,6 @@
 #include <span>
 #include <unordered_map>
 
-#include "client/nif/chunk_pool.hpp"
 #include "client/nif/frame_run.hpp"
 #include "client/nif/retained_frames.hpp"
 #include "proto/frame/frame_header.hpp"

@@ -9,8 +9,8 @@
 #include <cerrno>
 
 #include "base/log.hpp"
-#include "hub/control/goodbye.hpp"
 #include "hub/control/log_peer.hpp"
+#include "hub/shard/control_frame.hpp"
 
 namespace gimnet::hub {
 namespace {
@@ -140,6 +140,16 @@ void Acceptor::turn_away(const Stranger& peer) {
                " away; raise the limit (ulimit -n) or lower --limit nodes");
   static_cast<void>(send_goodbye(*peer.transport, proto::GoodbyeCode::no_memory,
                                  "the hub is out of descriptors; try again later"));
+}
+
+bool send_goodbye(net::Stream& transport, proto::GoodbyeCode code, std::string_view sentence) {
+  const std::vector<std::byte> frame =
+      control_frame(proto::Kind::link, NodeId{0}, kOwnHub,
+                    proto::encode(proto::Goodbye{code, std::string{sentence}}));
+  const std::array<iovec, 2> pieces{
+      iovec{const_cast<std::byte*>(proto::kOpening.data()), proto::kOpening.size()},
+      iovec{const_cast<std::byte*>(frame.data()), frame.size()}};  // send() only reads them
+  return transport.send(pieces).status == net::IoStatus::ok;
 }
 
 }  // namespace gimnet::hub

@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include "hub/control/descriptor_reserve.hpp"
 #include "hub/control/listener.hpp"
@@ -11,8 +12,14 @@
 #include "hub/limits.hpp"
 #include "hub/observe/refusal_counters.hpp"
 #include "net/socket_stream.hpp"
+#include "net/stream.hpp"
+#include "proto/control/link.hpp"
 
 namespace gimnet::hub {
+
+/// Writes the opening and GOODBYE to somebody who was not admitted. False: the peer takes nothing,
+/// which nobody needs to be told. Never waits.
+bool send_goodbye(net::Stream& transport, proto::GoodbyeCode code, std::string_view sentence);
 
 /// The origin of a connection, as people read it.
 struct PeerInfo {

@@ -11,7 +11,6 @@
 
 #include "base/check.hpp"
 #include "base/log.hpp"
-#include "hub/control/goodbye.hpp"
 #include "hub/control/log_peer.hpp"
 
 namespace gimnet::hub {

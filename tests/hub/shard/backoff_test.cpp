@@ -1,4 +1,4 @@
-#include "hub/shard/backoff.hpp"
+#include "hub/shard/connection.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "hub/shard/connection_state.hpp"
+#include "hub/shard/connection.hpp"
 
 #include <gtest/gtest.h>
 

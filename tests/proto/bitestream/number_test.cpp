@@ -1,4 +1,4 @@
-#include "proto/bitestream/number.hpp"
+#include "proto/bitestream/reader.hpp"
 
 #include <gtest/gtest.h>
 

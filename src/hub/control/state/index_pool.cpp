@@ -175,4 +175,18 @@ void IndexPool::wake(std::chrono::milliseconds now) {
   }
 }
 
+std::string IndexPool::shortage(const std::string& kind, std::chrono::milliseconds now) const {
+  if (waits_for_keeping(now)) {
+    return "this hub cannot write its state, and has no " + kind +
+           " left until it can; its log says why (a full disk?), try again when that is mended";
+  }
+  const std::optional<std::chrono::milliseconds> wait = waits_for_returns(now);
+  if (!wait)
+    return "all " + kind +
+           " that this hub may hand out are in use or resting; try again in a minute";
+  return "this hub was restarted a moment ago, and those who had its " + kind +
+         " may still come back; try again in " + std::to_string((wait->count() + 999) / 1'000) +
+         " s";
+}
+
 }  // namespace gimnet::hub

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <unordered_map>
 
 #include "hub/control/state/due_list.hpp"
@@ -69,6 +70,8 @@ class IndexPool {
 
   /// Would there be one to give, if next_grant() could be kept?
   [[nodiscard]] bool waits_for_keeping(std::chrono::milliseconds now) const;
+  /// Why nobody can be given an index now, as a sentence; `kind` names them ("node ids").
+  [[nodiscard]] std::string shortage(const std::string& kind, std::chrono::milliseconds now) const;
 
   /// What has to be kept where it outlives the hub, and what may be handed out then.
   struct Grant {

@@ -6,17 +6,26 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "hub/control/state/directory.hpp"
 #include "hub/control/state/due_list.hpp"
-#include "hub/control/state/durable.hpp"
 #include "hub/control/state/effects.hpp"
 #include "hub/control/state/identity.hpp"
+#include "hub/control/state/index_pool.hpp"
 #include "hub/control/state/services.hpp"
+#include "hub/control/state/session_token.hpp"
 #include "hub/control/state/sessions.hpp"
 #include "hub/network/state/name_copies.hpp"
 
 namespace gimnet::hub {
+
+/// What the state machines want to outlive the hub. A value type.
+struct Durable {
+  IndexPool::Grant nodes;
+  IndexPool::Grant groups;
+  std::vector<SessionToken> kicked;
+};
 
 /// What a HELLO asks for, and who sent it.
 struct JoinRequest {

@@ -4,7 +4,6 @@
 
 #include "base/check.hpp"
 #include "base/id_text.hpp"
-#include "hub/control/state/shortage.hpp"
 #include "proto/control/names.hpp"
 #include "proto/control/ns.hpp"
 
@@ -86,7 +85,7 @@ Result<Services::Advertised, proto::Refusal> Services::advertise(NodeIndex provi
   std::optional<GroupIndex> group;
   if (!keeps_group && !(group = take_group(now, effects))) {
     forget_if_idle(provider);
-    return proto::Refusal{Status::limit, shortage("group ids", group_indices_, now)};
+    return proto::Refusal{Status::limit, group_indices_.shortage("group ids", now)};
   }
   Topic& entry = topic(full_name);  // not before: a topic may have gone for its group
   if (group) {

@@ -4,7 +4,6 @@
 
 #include "base/check.hpp"
 #include "base/endian.hpp"
-#include "hub/control/state/mac_text.hpp"
 
 namespace gimnet::hub {
 namespace {

@@ -5,7 +5,6 @@
 
 #include "base/check.hpp"
 #include "base/id_text.hpp"
-#include "hub/control/state/shortage.hpp"
 
 namespace gimnet::hub {
 namespace {
@@ -81,7 +80,7 @@ Result<Session*, proto::Goodbye> Sessions::create(std::optional<std::uint16_t> s
 std::optional<proto::Goodbye> Sessions::id_refusal(milliseconds now) {
   if (indices_.ready(now)) return std::nullopt;
   return proto::Goodbye{proto::GoodbyeCode::hub_full,
-                        shortage("node ids", indices_, now) + ", or connect to another hub"};
+                        indices_.shortage("node ids", now) + ", or connect to another hub"};
 }
 
 Result<Session*, proto::Goodbye> Sessions::restore(const SessionToken& token,

@@ -1,4 +1,4 @@
-#include "hub/control/state/mac_text.hpp"
+#include "hub/control/state/session_token.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "hub/data/egress/untold_losses.hpp"
+#include "hub/data/egress/outbox.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,10 +1,10 @@
-#include "base/cut_text.hpp"
+#include "client/nif/error.hpp"
 
 #include <gtest/gtest.h>
 
 #include <string>
 
-namespace gimnet {
+namespace gimnet::nif {
 namespace {
 
 TEST(CutText, LeavesWhatFits) {
@@ -26,4 +26,4 @@ TEST(CutText, LeavesAlmostAllOfWhatIsNoUtf8) {
 }
 
 }  // namespace
-}  // namespace gimnet
+}  // namespace gimnet::nif

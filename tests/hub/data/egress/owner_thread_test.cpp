@@ -1,8 +1,8 @@
-#include "base/owner_thread.hpp"
+#include "hub/data/egress/egress_context.hpp"
 
 #include <gtest/gtest.h>
 
-namespace gimnet {
+namespace gimnet::hub {
 namespace {
 
 void enter_from_another_thread(const OwnerThread& owner) {
@@ -34,4 +34,4 @@ TEST(OwnerThreadDeathTest, AnotherThreadIsStopped) {
 #endif
 
 }  // namespace
-}  // namespace gimnet
+}  // namespace gimnet::hub
