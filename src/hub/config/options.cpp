@@ -207,7 +207,7 @@ std::string checked(const CommandLine& line) {
 }
 
 std::variant<CommandLine, CommandLineEnding> read_all(const CLI::App& app, CommandLine line) {
-  ReadConfiguration read = read_configuration(line.sources, {.pipe_patience = kPipePatience});
+  ReadConfiguration read = read_configuration(line.sources, {.pipes = true});
   if (!read.faults.empty()) {
     CommandLineEnding ending{2, {}};
     for (const Fault& fault : read.faults) ending.text += fault.line() + "\n";

@@ -1,7 +1,6 @@
 #include "hub/config/sources.hpp"
 
 #include <fcntl.h>
-#include <poll.h>
 #include <sys/stat.h>
 #include <sys/sysmacros.h>
 #include <unistd.h>
@@ -10,7 +9,6 @@
 #include <array>
 #include <cctype>
 #include <cerrno>
-#include <cstdint>
 #include <cstdlib>
 #include <filesystem>
 #include <iterator>
@@ -18,7 +16,6 @@
 #include <system_error>
 #include <utility>
 
-#include "base/clock.hpp"
 #include "base/descriptor.hpp"
 #include "base/log.hpp"
 #include "base/suggest.hpp"
@@ -26,8 +23,6 @@
 
 namespace gimnet::hub {
 namespace {
-
-using std::chrono::milliseconds;
 
 constexpr const char* kGivePath =
     "give the path of a TOML file with --config, or, in conf.d, take it away";
@@ -57,9 +52,8 @@ std::string instead_of_file(const struct stat& info, bool pipes) {
   return "it is a device" + remedy;
 }
 
-/// Reads what is there, at most one byte more than a configuration may have. 0: the end, EAGAIN:
-/// the rest is not there yet, or another error.
-int read_more(int descriptor, std::string& text) {
+/// Reads to the end, at most one byte more than a configuration may have. Returns an error or 0.
+int read_whole(int descriptor, std::string& text) {
   while (text.size() <= kConfigBytesMax) {
     const std::size_t before = text.size();
     const std::size_t wanted = std::min<std::size_t>(kConfigBytesMax + 1 - before, 64 * 1024);
@@ -72,28 +66,6 @@ int read_more(int descriptor, std::string& text) {
   return 0;
 }
 
-ConfigText read_pipe(int descriptor, milliseconds patience) {
-  ConfigText file;
-  const std::int64_t until = steady_now_ns() + patience.count() * 1'000'000;
-  const std::string remedy = "; write the configuration into it and close it, or give a file";
-  for (;;) {
-    const int error = read_more(descriptor, file.text);
-    if (error != 0 && error != EAGAIN) return no_text(error);
-    // Before the first writer has come its end looks as after the last one has left.
-    if (error == 0 && !file.text.empty()) return file;
-    const std::int64_t left_ns = until - steady_now_ns();
-    if (left_ns <= 0) {
-      std::string why = error == 0 ? "nobody wrote into this pipe" : "this pipe did not end";
-      why += " within " + std::to_string(patience.count()) + " ms";
-      return {{}, why + remedy};
-    }
-    pollfd wait{descriptor, POLLIN, 0};
-    const int events = ::poll(&wait, 1, static_cast<int>(left_ns / 1'000'000 + 1));
-    if (events > 0 && (wait.revents & POLLIN) == 0 && file.text.empty())
-      return {{}, "this pipe is empty" + remedy};
-  }
-}
-
 }  // namespace
 
 std::string remedy_of(const std::error_code& error, const std::string& otherwise) {
@@ -104,23 +76,25 @@ std::string remedy_of(const std::error_code& error, const std::string& otherwise
          "go, then try again";
 }
 
-ConfigText read_config_text(const std::string& path, milliseconds pipe_patience) {
-  const bool pipes = pipe_patience > milliseconds{0};
+ConfigText read_config_text(const std::string& path, bool pipes) {
   struct stat info{};
-  // Before it is opened: that may already do something to a device, or to who waits to write into a
+  // Before it is opened: opening may already do something to a device, or wake the writer of a
   // pipe.
   if (::stat(path.c_str(), &info) != 0) return no_text(errno);
   if (std::string error = instead_of_file(info, pipes); !error.empty())
     return {{}, std::move(error)};
-  const Descriptor file(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC));
+  const int waits = S_ISFIFO(info.st_mode) ? 0 : O_NONBLOCK;
+  const Descriptor file(::open(path.c_str(), O_RDONLY | waits | O_NOCTTY | O_CLOEXEC));
   if (file.get() < 0 || ::fstat(file.get(), &info) != 0) return no_text(errno);
   // Something else may have taken its place.
   if (std::string error = instead_of_file(info, pipes); !error.empty())
     return {{}, std::move(error)};
-  if (S_ISFIFO(info.st_mode)) return read_pipe(file.get(), pipe_patience);
   ConfigText whole;
-  const int error = read_more(file.get(), whole.text);
-  return error == 0 ? whole : no_text(error);
+  if (const int error = read_whole(file.get(), whole.text); error != 0) return no_text(error);
+  if (whole.text.empty() && S_ISFIFO(info.st_mode)) {
+    return {{}, "this pipe is empty; did the command behind it fail?"};
+  }
+  return whole;
 }
 
 namespace {
@@ -190,7 +164,7 @@ Given from_environment(const std::string& variable, const std::string& key, std:
 
 void read_one(const std::string& path, const ReadOptions& how, ReadConfiguration& read) {
   if (read.more_faults) return;
-  const ConfigText file = read_config_text(path, how.pipe_patience);
+  const ConfigText file = read_config_text(path, how.pipes);
   read.files.push_back(path);
   if (!file.error.empty()) {
     read.faults.push_back({path, "cannot read this file: " + file.error});
@@ -319,7 +293,7 @@ ReadConfiguration read_configuration(const ConfigSources& sources, const ReadOpt
     if (!read.place.parts_alone) read_one(read.place.file, how, read);
     read.faults.insert(read.faults.end(), of_folder.begin(), of_folder.end());
     ReadOptions only_files = how;
-    only_files.pipe_patience = {};
+    only_files.pipes = false;
     for (const std::string& part : parts) read_one(part, only_files, read);
   }
   for (const Given& given : sources.environment) apply(read.configuration, given, read.faults);

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <chrono>
 #include <cstddef>
 #include <optional>
 #include <string>
@@ -13,22 +12,16 @@
 
 namespace gimnet::hub {
 
-/// How long a hub that starts waits for the end of a pipe that is its configuration: who writes it
-/// may have to ask others, and who started the hub sees a hub that never comes.
-inline constexpr std::chrono::milliseconds kPipePatience{10'000};
-
 /// A whole file, or why it cannot be had.
 struct ConfigText {
   std::string text;   ///< where it is longer, kConfigBytesMax + 1 bytes of it
   std::string error;  ///< what is wrong, and what to do
 };
 
-/// Reads a regular file, and /dev/null as an empty one. Folders, sockets and devices are errors,
-/// and so is a pipe, unless it may be waited for: then it is read to its end, and one that has no
-/// end by then, or is empty, is an error: a command that failed must not leave a hub with its
-/// defaults. Never blocks for longer than that. Thread safety: any thread.
-[[nodiscard]] ConfigText read_config_text(const std::string& path,
-                                          std::chrono::milliseconds pipe_patience);
+/// Reads a regular file, and /dev/null as an empty one. Folders, sockets and devices are errors. A
+/// pipe is one unless `pipes`; it is then read to its end, however long that takes, and must not be
+/// empty: a command that failed must not leave a hub with its defaults. Thread safety: any thread.
+[[nodiscard]] ConfigText read_config_text(const std::string& path, bool pipes);
 
 /// What to do about an error: `otherwise` where it is not that the process has no descriptor left.
 [[nodiscard]] std::string remedy_of(const std::error_code& error, const std::string& otherwise);
@@ -57,9 +50,7 @@ struct ConfigPlace {
 /// How to read.
 struct ReadOptions {
   std::size_t faults_max = kConfigFaultsMax;  ///< told of the files
-  /// How long to wait for the end of a pipe in place of the file; 0: a pipe is a fault. It can be
-  /// read once.
-  std::chrono::milliseconds pipe_patience{};
+  bool pipes = false;  ///< the file may be a pipe, which can be read only once
 };
 
 /// What was read.
@@ -82,7 +73,7 @@ struct ReadConfiguration {
 
 /// Reads everything. Errors are faults: a file that is named and not there, or cannot be read, or
 /// is no regular file, is one. Thread safety: any thread. Limits: kConfigFilesMax files of
-/// kConfigBytesMax each. Blocks no longer than the disk does, and `pipe_patience`.
+/// kConfigBytesMax each. Blocks no longer than the disk, or the writer of a pipe, does.
 [[nodiscard]] ReadConfiguration read_configuration(const ConfigSources& sources,
                                                    const ReadOptions& how = {});
 

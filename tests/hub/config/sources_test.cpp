@@ -260,9 +260,7 @@ TEST_F(SourcesTest, APipeIsReadAtTheStartAndNeverInPlaceOfAPart) {
   ASSERT_GE(writer, 0);
   ASSERT_EQ(::write(writer, "hub_id = 9\n", 11), 11);
   ReadConfiguration started;
-  std::thread reader([&] {
-    started = read_configuration(sources_, {.pipe_patience = std::chrono::seconds{600}});
-  });
+  std::thread reader([&] { started = read_configuration(sources_, {.pipes = true}); });
   int queued = 1;
   while (queued != 0) ASSERT_EQ(::ioctl(writer, FIONREAD, &queued), 0);
   ::close(writer);
@@ -273,8 +271,7 @@ TEST_F(SourcesTest, APipeIsReadAtTheStartAndNeverInPlaceOfAPart) {
   write("hub.toml", "");
   make_conf_d();
   ASSERT_EQ(::mkfifo(folder_.path("conf.d/a.toml").c_str(), 0600), 0);
-  const ReadConfiguration part =
-      read_configuration(sources_, {.pipe_patience = std::chrono::seconds{600}});
+  const ReadConfiguration part = read_configuration(sources_, {.pipes = true});
   ASSERT_THAT(part.faults, SizeIs(1));
   EXPECT_THAT(part.faults[0].line(),
               HasSubstr("conf.d/a.toml: cannot read this file: it is a pipe"));
