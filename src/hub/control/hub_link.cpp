@@ -54,6 +54,8 @@ void HubLink::begin_connection(const proto::HubIntroduction& said, const LinkTer
   heard_sent_ns_ = heard_ns_ = 0;
   if (!same || !resume_until_) {
     clock_ = {};
+    clock_sample_count_ = 0;
+    told_ahead_.reset();
     cost_ = cost_of(is_dialled() ? dialled_->cost : said.cost);
   }
   resume_until_.reset();
@@ -100,11 +102,31 @@ bool HubLink::hear_keep_alive(const proto::route::KeepAlive& heard, milliseconds
   const nanoseconds round_trip{(wall_ns - heard.heard_sent_ns) - held};
   // A clock that was set meanwhile tells nothing.
   if (held < 0 || round_trip < nanoseconds{0} || round_trip > std::chrono::minutes(1)) return false;
-  if (clock_.round_trip_least == nanoseconds{0} || round_trip < clock_.round_trip_least) {
+  if (clock_.round_trip_least == nanoseconds{0} || round_trip < clock_.round_trip_least)
     clock_.round_trip_least = std::max(round_trip, nanoseconds{1});
-    clock_.offset = nanoseconds{heard.sent_ns - wall_ns} + round_trip / 2;
-  }
+  compare_clocks({round_trip, nanoseconds{heard.sent_ns - wall_ns} + round_trip / 2});
   return cost_.note_round_trip(clock_.round_trip_least);
+}
+
+void HubLink::compare_clocks(ClockSample sample) {
+  // Each sample is right to half of its round trip. One that contradicts the others shows that a
+  // clock was set, and they are worth nothing.
+  const nanoseconds apart = std::chrono::abs(sample.ahead - clock_.ahead);
+  if (apart > sample.round_trip / 2 + clock_.error + milliseconds{1}) clock_sample_count_ = 0;
+  clock_samples_[clock_sample_count_++ % kClockSamples] = sample;
+  const auto end = clock_samples_.begin() + std::min(clock_sample_count_, kClockSamples);
+  const auto best =
+      std::ranges::min_element(clock_samples_.begin(), end, {}, &ClockSample::round_trip);
+  clock_.ahead = best->ahead;
+  clock_.error = best->round_trip / 2;
+}
+
+std::optional<nanoseconds> HubLink::take_clock_change() {
+  if (clock_.round_trip_least == nanoseconds{0}) return std::nullopt;
+  if (told_ahead_ && std::chrono::abs(*told_ahead_ - clock_.ahead) < milliseconds{1})
+    return std::nullopt;
+  told_ahead_ = clock_.ahead;
+  return told_ahead_;
 }
 
 void HubLink::dial_again(std::uint64_t random, milliseconds now) {

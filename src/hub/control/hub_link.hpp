@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <deque>
@@ -19,7 +20,8 @@ namespace gimnet::hub {
 /// The clock of the hub at the other end of a link, compared with this hub's.
 struct LinkClock {
   std::chrono::nanoseconds round_trip_least{};  ///< of this connection; 0: not measured
-  std::chrono::nanoseconds offset{};            ///< of the other clock to this one, measured then
+  std::chrono::nanoseconds ahead{};  ///< of this clock the other one; 0 until it is measured
+  std::chrono::nanoseconds error{};  ///< of `ahead`, at most
 };
 
 /// One link as the conductor knows it: its other end, its connections, its times. Thread safety:
@@ -34,6 +36,8 @@ class HubLink {
   static constexpr std::size_t kBreaksMost = 2;
   static constexpr std::chrono::milliseconds kBreaksWithin = std::chrono::minutes(1);
   static constexpr std::chrono::milliseconds kDampedMost = std::chrono::seconds(10);
+  /// The other clock is compared by the shortest of so many latest round trips, since clocks drift.
+  static constexpr std::size_t kClockSamples = 16;
 
   /// A link that this hub dials.
   HubLink(LinkNumber number, DialledLink dialled);
@@ -83,6 +87,10 @@ class HubLink {
   [[nodiscard]] std::chrono::milliseconds heard_at() const { return heard_at_; }
   [[nodiscard]] std::uint16_t cost() const { return cost_.value().value_or(LinkCost::kUnmeasured); }
   [[nodiscard]] const LinkClock& clock() const { return clock_; }
+  /// LinkClock::ahead, if the shard has to be told of it: less than a millisecond changes nothing.
+  [[nodiscard]] std::optional<std::chrono::nanoseconds> take_clock_change();
+  /// As the shard knows it; nothing: it does not.
+  [[nodiscard]] std::optional<std::chrono::nanoseconds> told_ahead() const { return told_ahead_; }
 
   // Dialling. REQUIRES: is_dialled().
   [[nodiscard]] std::optional<std::chrono::milliseconds> dial_at() const { return dial_at_; }
@@ -105,6 +113,12 @@ class HubLink {
   std::uint64_t taken = 0;  ///< data frames of the last connection
 
  private:
+  struct ClockSample {
+    std::chrono::nanoseconds round_trip{};
+    std::chrono::nanoseconds ahead{};
+  };
+  void compare_clocks(ClockSample sample);
+
   const LinkNumber number_;
   const std::string name_;
   std::optional<DialledLink> dialled_;
@@ -118,6 +132,9 @@ class HubLink {
   std::int64_t heard_ns_ = 0;
   LinkCost cost_;
   LinkClock clock_;
+  std::array<ClockSample, kClockSamples> clock_samples_;
+  std::size_t clock_sample_count_ = 0;  ///< the ring wraps
+  std::optional<std::chrono::nanoseconds> told_ahead_;
   std::optional<std::chrono::milliseconds> resume_until_;
   std::optional<std::chrono::milliseconds> dial_at_;
   std::optional<std::chrono::milliseconds> damped_until_;

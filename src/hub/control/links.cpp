@@ -150,7 +150,6 @@ void Links::attach(HubLink& link, AttachCommand command, const proto::HubIntrodu
     link.place = wiring_.slots.take();
     by_generation_[link.place->generation] = link.number();
   }
-  const bool again = link.attachment != 0;
   link.begin_connection(said, terms, moment.now);
   link.last_error.clear();
   command.session = ref_of(*link.place);
@@ -161,10 +160,12 @@ void Links::attach(HubLink& link, AttachCommand command, const proto::HubIntrodu
   command.link->rule.allow = terms.allow;
   std::ranges::sort(command.link->rule.allow);
   command.link->silent_ms = link.silent_ms();
+  if (link.told_ahead()) command.link->clock_ahead_ns = link.told_ahead()->count();
   wiring_.shards.send(link.place->shard, std::move(command));
   log_line(LogLevel::info, {"link", link.name()},
-           std::string{again ? "linked again" : "linked"} + (link.is_dialled() ? " to " : " by ") +
-               link.title() + ", " + link.address + ", link " + link.name());
+           std::string{link.attachment > 1 ? "linked again " : "linked "} +
+               (link.is_dialled() ? "to " : "by ") + link.title() + ", " + link.address +
+               ", link " + link.name());
 }
 
 /// The side that dialled begins: what a refused attempt costs is a HELLO.
@@ -195,6 +196,8 @@ void Links::on_route(const SessionRef& session, std::uint32_t attachment,
       if (!heard) break;
       if (link->hear_keep_alive(*heard, moment.now, moment.wall_ns))
         network_.set_cost(link->number(), link->cost());
+      if (const auto ahead = link->take_clock_change())
+        wiring_.shards.send(link->place->shard, LinkClockCommand{ref_of(*link->place), *ahead});
       network_.take_digest(link->number(), heard->digest, moment.now);
       break;
     }
@@ -321,11 +324,8 @@ void Links::leave_network(Verdict verdict, Moment moment) {
     withdraw(*link);
     link->last_error = sentence;
     if (!link->is_dialled()) continue;
-    if (copied) {
-      link->dial_after(HubLink::kCopyPause, moment.now);
-    } else {
-      link->dial_after(milliseconds{250 + wiring_.random() % 250}, moment.now);
-    }
+    const milliseconds soon{250 + wiring_.random() % 250};
+    link->dial_after(copied ? HubLink::kCopyPause : soon, moment.now);
   }
 }
 
@@ -333,17 +333,15 @@ void Links::publish_routes() {
   next_hops_.publish(network_.map().next_hops(), [this](LinkNumber number) {
     const HubLink* link = find(number);
     if (link == nullptr || !link->place) return NextHop{};
-    const Place& place = *link->place;
-    return NextHop{{place.shard, place.slot, place.generation}, link->peer()->hub.hub};
+    return NextHop{{link->place->shard, link->place->slot, link->place->generation},
+                   link->peer()->hub.hub};
   });
 }
 
 void Links::send(const HubLink& link, proto::Kind kind, std::span<const std::byte> payload) {
-  SendControlCommand command;
-  command.session = ref_of(*link.place);
-  command.attachment = link.attachment;
-  command.frame = control_frame(kind, NodeId{}, wiring_.facts.id, payload);
-  wiring_.shards.send(link.place->shard, std::move(command));
+  wiring_.shards.send(link.place->shard,
+                      SendControlCommand{ref_of(*link.place), link.attachment,
+                                         control_frame(kind, NodeId{}, wiring_.facts.id, payload)});
 }
 
 HubLink* Links::find(LinkNumber number) {
@@ -361,8 +359,9 @@ std::string Links::add(const DialledLink& link) {
     return "there is a link '" + link.name + "' already; give another name";
   if (links_.size() >= kLinksMax) return "this hub has as many links as there can be";
   const LinkNumber number{++last_number_};
-  auto& added = links_.emplace(number, std::make_unique<HubLink>(number, link)).first->second;
+  auto added = std::make_unique<HubLink>(number, link);
   added->dial_after(milliseconds{0}, milliseconds{0});
+  links_.emplace(number, std::move(added));
   return {};
 }
 

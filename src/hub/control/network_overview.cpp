@@ -87,8 +87,8 @@ LinkView NetworkOverview::view_of(const HubLink& link) const {
   const LinkClock& clock = link.clock();
   view.rtt_us = static_cast<std::uint32_t>(
       std::chrono::ceil<std::chrono::microseconds>(clock.round_trip_least).count());
-  view.clock_offset_ns = clock.offset.count();
-  view.clock_error_ns = (clock.round_trip_least / 2).count();
+  view.clock_offset_ns = clock.ahead.count();
+  view.clock_error_ns = clock.error.count();
   if (!link.place || link.place->shard.value() >= parts_.sessions.size()) return view;
   const SessionCounts counts =
       parts_.sessions[link.place->shard.value()]->counts(link.place->slot, link.place->generation);

@@ -40,8 +40,8 @@ void Attacher::attach(AttachCommand command) {
   connection.goes_on = false;
   connection.ingress.node = connection.node;
   if (command.link) {
-    connection.link = std::make_unique<LinkPeer>(
-        LinkPeer{std::move(command.link->rule), command.link->silent_ms});
+    connection.link = std::make_unique<LinkPeer>(LinkPeer{
+        std::move(command.link->rule), command.link->silent_ms, command.link->clock_ahead_ns});
     connection.ingress.link = &connection.link->rule;
   }
   connection.posted_shards = kAllShards;

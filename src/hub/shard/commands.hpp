@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -54,6 +55,7 @@ inline constexpr std::uint64_t kLinkControlBytes = 64 * 1024 * 1024;
 struct LinkAttach {
   LinkRule rule;
   std::uint32_t silent_ms = 0;
+  std::optional<std::int64_t> clock_ahead_ns{};  ///< as LinkClockCommand has it; nothing: not known
   /// This hub dialled: WELCOME was read already, and nothing is written first. `resumed` is what it
   /// said, `epoch` what HELLO said of this end.
   bool dialled = false;
@@ -180,6 +182,12 @@ struct RenumberCommand {
   std::string sentence;
 };
 
+/// The clock of the hub at the other end of a link is so far ahead of this hub's.
+struct LinkClockCommand {
+  SessionRef session;
+  std::chrono::nanoseconds ahead{};
+};
+
 /// What the shard goes by from its next turn on.
 struct LimitsCommand {
   Limits limits;
@@ -196,8 +204,8 @@ struct StopCommand {};
 
 using ShardCommand =
     std::variant<AttachCommand, SendControlCommand, TellCommand, TellAgainCommand, CloseCommand,
-                 ReleaseCommand, RenumberCommand, LimitsCommand, PaceCommand, EndPaceCommand,
-                 ForgetRetainedCommand, DrainCommand, StopCommand>;
+                 ReleaseCommand, RenumberCommand, LinkClockCommand, LimitsCommand, PaceCommand,
+                 EndPaceCommand, ForgetRetainedCommand, DrainCommand, StopCommand>;
 
 // ---- shard -> conductor
 // --------------------------------------------------------------------------------------------

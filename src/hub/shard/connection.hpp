@@ -108,6 +108,8 @@ struct ResumeState {
 struct LinkPeer {
   LinkRule rule;
   std::uint32_t silent_ms = 0;
+  /// How far the clock of the hub there is ahead of this hub's; nothing: not measured yet.
+  std::optional<std::int64_t> clock_ahead_ns{};
   TokenBucket control{};  ///< frames for the conductor
 };
 

@@ -264,6 +264,11 @@ void IoShard::execute(ShardCommand& command) {
                      attacher_.renumber(*connection, renumber.node);
                    }
                  },
+                 [&](const LinkClockCommand& clock) {
+                   Connection* connection = state_.find(clock.session);
+                   if (connection != nullptr && connection->is_link())
+                     connection->link->clock_ahead_ns = clock.ahead.count();
+                 },
                  [&](const LimitsCommand& changed) { state_.limits = changed.limits; },
                  [&](PaceCommand& pace) { begin_pace(pace); },
                  [&](EndPaceCommand& end) {

@@ -218,8 +218,7 @@ bool Reader::refuse(Connection& connection, proto::DropReason reason, proto::Goo
 void Reader::route(Connection& connection, const proto::NextRun& found) {
   const proto::RunView& view = found.run;
   count(connection, view);
-  if (proto::load_header(view.bytes).has(proto::kFlagExt))
-    stamp_arrival(view, connection.is_link() ? proto::Origin::hub : proto::Origin::node);
+  if (proto::load_header(view.bytes).has(proto::kFlagExt)) stamp_arrival(connection, view);
   state_.router.route(state_.receive_buffer.buffer(), view);
 }
 
@@ -235,8 +234,11 @@ void Reader::count_taken(Connection& connection, const proto::RunView& view) {
   if (resume.bytes_since_told >= resume.peer_resume_bytes / 4) send_confirm(state_, connection);
 }
 
-/// TRACE gets the time of arrival, and an AGE from the future begins now.
-void Reader::stamp_arrival(const proto::RunView& view, proto::Origin origin) {
+/// TRACE gets the time of arrival. The origin of an AGE is in the time of the hub that the frame
+/// comes from; it is moved to this hub's.
+void Reader::stamp_arrival(const Connection& connection, const proto::RunView& view) {
+  const LinkPeer* link = connection.link.get();
+  const proto::Origin origin = link != nullptr ? proto::Origin::hub : proto::Origin::node;
   const auto frame = proto::parse_frame({view.bytes, view.size}, origin);
   if (!frame) return;
   const std::span<std::byte> extensions(const_cast<std::byte*>(frame->extensions.data()),
@@ -245,7 +247,7 @@ void Reader::stamp_arrival(const proto::RunView& view, proto::Origin origin) {
   // in which it came. Both are the time of their turn: read anew, an arrival could be later than a
   // departure.
   const std::int64_t now_ns = state_.egress.now_wall_ns;
-  proto::bound_origin(extensions, now_ns);
+  proto::adopt_origin(extensions, link != nullptr ? link->clock_ahead_ns : 0, now_ns);
   static_cast<void>(proto::fill_trace(extensions, {state_.shared.hub, now_ns, now_ns}));
 }
 

@@ -85,7 +85,7 @@ class Reader {
   /// Data frames that it sent, admitted.
   void count(Connection& connection, const proto::RunView& view);
   void count_taken(Connection& connection, const proto::RunView& view);
-  void stamp_arrival(const proto::RunView& view, proto::Origin origin);
+  void stamp_arrival(const Connection& connection, const proto::RunView& view);
   [[nodiscard]] bool refuse(Connection& connection, proto::DropReason reason,
                             proto::GoodbyeCode code, const std::string& sentence);
 

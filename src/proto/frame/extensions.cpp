@@ -68,12 +68,16 @@ bool too_old(const Age& age, std::int64_t now_ns) {
   return passed_ns > static_cast<std::uint64_t>(age.longest_ms) * kNsPerMs;
 }
 
-void bound_origin(std::span<std::byte> extensions, std::int64_t now_ns) {
+void adopt_origin(std::span<std::byte> extensions, std::optional<std::int64_t> ahead_ns,
+                  std::int64_t now_ns) {
   ExtensionReader reader(extensions);
   while (const auto extension = reader.next()) {
     if (extension->type != ExtensionType::age || extension->value.size() != kAgeSize) continue;
     std::byte* value = extensions.data() + (extension->value.data() - extensions.data());
-    if (load_le<std::int64_t>(value) > now_ns) store_le(value, now_ns);
+    std::int64_t origin_ns = now_ns;
+    const bool fits =
+        ahead_ns && !__builtin_sub_overflow(load_le<std::int64_t>(value), *ahead_ns, &origin_ns);
+    store_le(value, fits ? std::min(origin_ns, now_ns) : now_ns);
     return;
   }
 }

@@ -58,9 +58,11 @@ struct Age {
 /// True when more than `longest_ms` went by; an origin in the future (clocks differ) is not old.
 [[nodiscard]] bool too_old(const Age& age, std::int64_t now_ns);
 
-/// An origin of the first AGE that is later than `now_ns` becomes `now_ns`, in place: the frame
-/// ages from now on, whatever clock its sender has.
-void bound_origin(std::span<std::byte> extensions, std::int64_t now_ns);
+/// Moves the origin of the first AGE, in place, to this clock from one that is `ahead_ns` ahead of
+/// it. An origin that is later than `now_ns` then becomes `now_ns`, and so does one of a clock that
+/// is not known: the frame ages from now on.
+void adopt_origin(std::span<std::byte> extensions, std::optional<std::int64_t> ahead_ns,
+                  std::int64_t now_ns);
 
 // TRACE
 

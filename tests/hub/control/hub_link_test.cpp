@@ -6,6 +6,8 @@ namespace gimnet::hub {
 namespace {
 
 using std::chrono::milliseconds;
+using std::chrono::nanoseconds;
+using std::chrono::seconds;
 
 proto::HubIntroduction introduction(std::uint64_t instance = 1) {
   proto::HubIntroduction said;
@@ -41,7 +43,7 @@ TEST(HubLink, MayComeBackForItsTimeAndFourRoundTrips) {
   // 20 ms after it was sent, and not held there.
   EXPECT_TRUE(link.hear_keep_alive(heard, milliseconds{1'020}, 1'020'000'000));
   EXPECT_EQ(link.cost(), LinkCost::kLeastMeasured + 20);
-  EXPECT_EQ(link.clock().offset, std::chrono::nanoseconds{7'000'000'000 - 1'010'000'000});
+  EXPECT_EQ(link.clock().ahead, std::chrono::nanoseconds{7'000'000'000 - 1'010'000'000});
   link.end_connection(false, milliseconds{2'000});
   EXPECT_EQ(link.resume_until(), milliseconds{2'000 + 300 + 80});
 }
@@ -55,6 +57,38 @@ TEST(HubLink, AClockThatWasSetMeanwhileTellsNothing) {
   EXPECT_FALSE(link.hear_keep_alive(heard, milliseconds{10}, 1'000'000'000))
       << "sent in the future";
   EXPECT_EQ(link.clock().round_trip_least.count(), 0);
+}
+
+/// A keep-alive that was answered at once, `round_trip` after it was sent, by a clock that is
+/// `ahead`.
+void hear(HubLink& link, nanoseconds round_trip, nanoseconds ahead) {
+  proto::route::KeepAlive heard;
+  const std::int64_t now_ns = 1'000'000'000'000;
+  heard.heard_sent_ns = now_ns - round_trip.count();
+  heard.sent_ns = heard.heard_ns = now_ns - round_trip.count() / 2 + ahead.count();
+  static_cast<void>(link.hear_keep_alive(heard, milliseconds{1'000'000}, now_ns));
+}
+
+TEST(HubLink, TheShortestOfTheLatestRoundTripsComparesTheClocks) {
+  HubLink link(LinkNumber{1}, "up");
+  link.begin_connection(introduction(), {}, milliseconds{0});
+  hear(link, milliseconds{2}, seconds{5});
+  hear(link, milliseconds{8}, seconds{5} + milliseconds{2});
+  EXPECT_EQ(link.clock().ahead, seconds{5});
+  EXPECT_EQ(link.clock().error, milliseconds{1});
+  for (std::size_t i = 0; i < HubLink::kClockSamples; ++i)
+    hear(link, milliseconds{8}, seconds{5} + milliseconds{2});
+  EXPECT_EQ(link.clock().ahead, seconds{5} + milliseconds{2}) << "clocks drift";
+  EXPECT_EQ(link.clock().round_trip_least, milliseconds{2});
+}
+
+TEST(HubLink, AClockThatIsSetIsFollowedAtOnce) {
+  HubLink link(LinkNumber{1}, "up");
+  link.begin_connection(introduction(), {}, milliseconds{0});
+  for (int i = 0; i < 20; ++i) hear(link, milliseconds{2}, seconds{5});
+  hear(link, milliseconds{20}, seconds{-30});
+  EXPECT_EQ(link.clock().ahead, seconds{-30});
+  EXPECT_EQ(link.clock().error, milliseconds{10});
 }
 
 TEST(HubLink, IsDampedFromTheThirdBreakOn) {

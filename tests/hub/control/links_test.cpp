@@ -1,5 +1,6 @@
 #include "hub/control/links.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "tests/hub/control/support/link_rig.hpp"
@@ -160,8 +161,11 @@ TEST(Links, KeepAlivesMeasureTheRoundTripAndTheOtherClock) {
   hubs.link();
   for (int i = 0; i < 3; ++i) hubs.pass(milliseconds{250});
   const auto& link = *hubs.b.links.all().begin()->second;
-  EXPECT_EQ(link.clock().offset, std::chrono::seconds(5));
+  EXPECT_EQ(link.clock().ahead, std::chrono::seconds(5));
   EXPECT_GT(link.clock().round_trip_least.count(), 0);
+  const auto told = hubs.b.shards.all<LinkClockCommand>();
+  ASSERT_THAT(told, ::testing::SizeIs(1)) << "what does not change is told once";
+  EXPECT_EQ(told[0]->ahead, std::chrono::seconds(5));
 }
 
 }  // namespace

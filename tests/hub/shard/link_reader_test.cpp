@@ -3,6 +3,9 @@
 
 #include <algorithm>
 
+#include "base/clock.hpp"
+#include "proto/frame/extensions.hpp"
+#include "proto/frame/frame_builder.hpp"
 #include "tests/hub/shard/support/hub_rig.hpp"
 
 // Frames that come over links, and go over them.
@@ -62,6 +65,41 @@ TEST(LinkReader, EveryFrameOfARunCountsItsHop) {
   rig.settle();
   ASSERT_THAT(node.texts(), ElementsAre("a", "b", "longer", "c"));
   for (const auto& frame : node.frames) EXPECT_EQ(frame.header.hops, 5);
+}
+
+/// A frame of a node of another hub that is worth nothing a quarter of a second after its origin.
+std::vector<std::byte> aging_frame(std::uint32_t dst, std::int64_t origin_ns) {
+  std::byte memory[64];
+  proto::ExtensionWriter writer(memory);
+  EXPECT_TRUE(writer.add_age({origin_ns, 250}));
+  proto::FrameParts parts;
+  parts.header.dst = dst;
+  parts.header.src = kSource;
+  parts.extensions = writer.written();
+  std::vector<std::byte> bytes(256);
+  bytes.resize(proto::write_frame(parts, std::as_bytes(std::span("hello", 5)), bytes));
+  return bytes;
+}
+
+TEST(LinkReader, AFrameAgesByTheClockOfTheHubThatItComesFrom) {
+  constexpr std::int64_t kHourNs = 3'600'000'000'000;
+  HubRig rig;
+  FakeNode& node = rig.join(0);
+  FakeNode& link = rig.link(0, kNear);
+  rig.write(link, aging_frame(node.id.value(), wall_now_ns() - kHourNs));
+  rig.settle();
+  EXPECT_THAT(node.frames, SizeIs(1)) << "it ages from now on while that clock is not known";
+  for (const std::int64_t ahead_ns : {kHourNs, -kHourNs}) {
+    rig.command(0, LinkClockCommand{link.session, std::chrono::nanoseconds{ahead_ns}});
+    node.frames.clear();
+    rig.write(link, aging_frame(node.id.value(), wall_now_ns() + ahead_ns));
+    rig.settle();
+    EXPECT_THAT(node.frames, SizeIs(1)) << "it is new";
+    rig.write(link, aging_frame(node.id.value(), wall_now_ns() + ahead_ns - 2 * 250'000'000));
+    rig.settle();
+    EXPECT_THAT(node.frames, SizeIs(1)) << "it is too old";
+  }
+  EXPECT_EQ(rig.dropped(DropReason::too_old), 2u);
 }
 
 TEST(LinkReader, AFrameThatCrossed31LinksGoesNoFurther) {

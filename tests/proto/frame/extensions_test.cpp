@@ -71,16 +71,32 @@ TEST(Age, EndsAfterItsTime) {
 TEST(Age, FromTheFutureBeginsNow) {
   for (const std::int64_t ahead_ns : {std::int64_t{3'600'000'000'000}, std::int64_t{1}}) {
     auto extensions = extensions_of("frame/unicast_age");
-    bound_origin(extensions, kNewYear - ahead_ns);
+    adopt_origin(extensions, 0, kNewYear - ahead_ns);
     EXPECT_EQ(find_age(extensions), (Age{kNewYear - ahead_ns, 250}));
   }
   auto extensions = extensions_of("frame/unicast_age");
-  bound_origin(extensions, kNewYear);
-  bound_origin(extensions, kNewYear + 1);
+  adopt_origin(extensions, 0, kNewYear);
+  adopt_origin(extensions, 0, kNewYear + 1);
   EXPECT_EQ(find_age(extensions), (Age{kNewYear, 250})) << "of now, and of the past";
   auto odd = from_hex("02 01 00");
-  bound_origin(odd, 0);
+  adopt_origin(odd, 0, 0);
   EXPECT_EQ(odd, from_hex("02 01 00")) << "of a wrong size";
+}
+
+TEST(Age, OfAnotherClockIsMovedToThisOne) {
+  constexpr std::int64_t kHour = 3'600'000'000'000;
+  const std::int64_t later = kNewYear + kHour + 1;
+  for (const std::int64_t ahead_ns : {-kHour, std::int64_t{5}, kHour}) {
+    auto extensions = extensions_of("frame/unicast_age");
+    adopt_origin(extensions, ahead_ns, later);
+    EXPECT_EQ(find_age(extensions), (Age{kNewYear - ahead_ns, 250}));
+  }
+  auto of_unknown = extensions_of("frame/unicast_age");
+  adopt_origin(of_unknown, std::nullopt, later);
+  EXPECT_EQ(find_age(of_unknown), (Age{later, 250})) << "it ages from now on";
+  auto far = extensions_of("frame/unicast_age");
+  adopt_origin(far, std::numeric_limits<std::int64_t>::min(), later);
+  EXPECT_EQ(find_age(far), (Age{later, 250})) << "no time has that distance";
 }
 
 TEST(Age, SurvivesAnyTime) {
