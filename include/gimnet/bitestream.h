@@ -18,6 +18,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "gimnet/export.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -89,7 +91,7 @@ static inline bitestream_key bitestream_text_key(const char* text, size_t size) 
       text, 0, size <= BITESTREAM_KEY_TEXT_MAX ? (uint32_t)size : BITESTREAM_KEY_TEXT_MAX + 1};
   return key;
 }
-bool bitestream_keys_equal(bitestream_key a, bitestream_key b);
+GIMNET_API bool bitestream_keys_equal(bitestream_key a, bitestream_key b);
 
 /* Writing
  * -------------------------------------------------------------------------------------------------
@@ -107,42 +109,42 @@ typedef struct bitestream_writer {
 } bitestream_writer;
 
 /* Writes into the caller's memory, which must outlive the writer. */
-bitestream_writer bitestream_writer_over(void* memory, size_t size);
+GIMNET_API bitestream_writer bitestream_writer_over(void* memory, size_t size);
 /* Allocates as it grows; free it with bitestream_writer_free(). */
-bitestream_writer bitestream_writer_growable(void);
-void bitestream_writer_free(bitestream_writer* writer);
+GIMNET_API bitestream_writer bitestream_writer_growable(void);
+GIMNET_API void bitestream_writer_free(bitestream_writer* writer);
 /* BITESTREAM_OK: bytes[0..size) is a whole stream. */
-bitestream_status bitestream_finish(const bitestream_writer* writer);
+GIMNET_API bitestream_status bitestream_finish(const bitestream_writer* writer);
 
-void bitestream_put_opaque(bitestream_writer* writer, bitestream_key key, const void* bytes,
-                           size_t size);
-void bitestream_put_bool(bitestream_writer* writer, bitestream_key key, bool value);
-void bitestream_put_u8(bitestream_writer* writer, bitestream_key key, uint8_t value);
-void bitestream_put_u16(bitestream_writer* writer, bitestream_key key, uint16_t value);
-void bitestream_put_u32(bitestream_writer* writer, bitestream_key key, uint32_t value);
-void bitestream_put_u64(bitestream_writer* writer, bitestream_key key, uint64_t value);
-void bitestream_put_i8(bitestream_writer* writer, bitestream_key key, int8_t value);
-void bitestream_put_i16(bitestream_writer* writer, bitestream_key key, int16_t value);
-void bitestream_put_i32(bitestream_writer* writer, bitestream_key key, int32_t value);
-void bitestream_put_i64(bitestream_writer* writer, bitestream_key key, int64_t value);
-void bitestream_put_f32(bitestream_writer* writer, bitestream_key key, float value);
-void bitestream_put_f64(bitestream_writer* writer, bitestream_key key, double value);
+GIMNET_API void bitestream_put_opaque(bitestream_writer* writer, bitestream_key key,
+                                      const void* bytes, size_t size);
+GIMNET_API void bitestream_put_bool(bitestream_writer* writer, bitestream_key key, bool value);
+GIMNET_API void bitestream_put_u8(bitestream_writer* writer, bitestream_key key, uint8_t value);
+GIMNET_API void bitestream_put_u16(bitestream_writer* writer, bitestream_key key, uint16_t value);
+GIMNET_API void bitestream_put_u32(bitestream_writer* writer, bitestream_key key, uint32_t value);
+GIMNET_API void bitestream_put_u64(bitestream_writer* writer, bitestream_key key, uint64_t value);
+GIMNET_API void bitestream_put_i8(bitestream_writer* writer, bitestream_key key, int8_t value);
+GIMNET_API void bitestream_put_i16(bitestream_writer* writer, bitestream_key key, int16_t value);
+GIMNET_API void bitestream_put_i32(bitestream_writer* writer, bitestream_key key, int32_t value);
+GIMNET_API void bitestream_put_i64(bitestream_writer* writer, bitestream_key key, int64_t value);
+GIMNET_API void bitestream_put_f32(bitestream_writer* writer, bitestream_key key, float value);
+GIMNET_API void bitestream_put_f64(bitestream_writer* writer, bitestream_key key, double value);
 /* UTF-8, `size` bytes without a closing zero. */
-void bitestream_put_text(bitestream_writer* writer, bitestream_key key, const char* text,
-                         size_t size);
+GIMNET_API void bitestream_put_text(bitestream_writer* writer, bitestream_key key, const char* text,
+                                    size_t size);
 /* Nanoseconds since 1970. */
-void bitestream_put_time(bitestream_writer* writer, bitestream_key key, int64_t ns);
+GIMNET_API void bitestream_put_time(bitestream_writer* writer, bitestream_key key, int64_t ns);
 /* `count` elements in memory order, for an array type; a bool is a byte of 0 or 1. */
-void bitestream_put_array(bitestream_writer* writer, bitestream_key key, bitestream_type type,
-                          const void* elements, size_t count);
+GIMNET_API void bitestream_put_array(bitestream_writer* writer, bitestream_key key,
+                                     bitestream_type type, const void* elements, size_t count);
 /* Everything put between the two calls belongs to the nested stream. One that is left out in the
  * end needs room for its key until then. */
-void bitestream_begin_nested(bitestream_writer* writer, bitestream_key key);
-void bitestream_end_nested(bitestream_writer* writer);
+GIMNET_API void bitestream_begin_nested(bitestream_writer* writer, bitestream_key key);
+GIMNET_API void bitestream_end_nested(bitestream_writer* writer);
 /* A value as it stands on the wire, of any type but a nested one; its size is checked against the
  * type. */
-void bitestream_put_value(bitestream_writer* writer, bitestream_key key, bitestream_type type,
-                          const void* bytes, size_t size);
+GIMNET_API void bitestream_put_value(bitestream_writer* writer, bitestream_key key,
+                                     bitestream_type type, const void* bytes, size_t size);
 
 /* Reading
  * -------------------------------------------------------------------------------------------------
@@ -163,40 +165,42 @@ typedef struct bitestream_value {
   uint32_t depth; /* of the stream that it stands in */
 } bitestream_value;
 
-bitestream_reader bitestream_reader_over(const void* bytes, size_t size);
+GIMNET_API bitestream_reader bitestream_reader_over(const void* bytes, size_t size);
 /* BITESTREAM_OK: `value` is the next one. BITESTREAM_END, BITESTREAM_MALFORMED: as every further
  * call. */
-bitestream_status bitestream_next(bitestream_reader* reader, bitestream_value* value);
+GIMNET_API bitestream_status bitestream_next(bitestream_reader* reader, bitestream_value* value);
 /* The first value with that key, wherever the reader stands; does not move it. BITESTREAM_END:
  * there is none. */
-bitestream_status bitestream_find(const bitestream_reader* reader, bitestream_key key,
-                                  bitestream_value* value);
+GIMNET_API bitestream_status bitestream_find(const bitestream_reader* reader, bitestream_key key,
+                                             bitestream_value* value);
 /* Checks everything, nested streams, texts and bools included, before any of it is used. Costs one
  * pass. */
-bitestream_status bitestream_check(const void* bytes, size_t size);
+GIMNET_API bitestream_status bitestream_check(const void* bytes, size_t size);
 
 /* Numbers of any type are given where no value is lost. False: not a number, or it does not fit;
  * `out` is unchanged. */
-bool bitestream_get_u8(const bitestream_value* value, uint8_t* out);
-bool bitestream_get_u16(const bitestream_value* value, uint16_t* out);
-bool bitestream_get_u32(const bitestream_value* value, uint32_t* out);
-bool bitestream_get_u64(const bitestream_value* value, uint64_t* out);
-bool bitestream_get_i8(const bitestream_value* value, int8_t* out);
-bool bitestream_get_i16(const bitestream_value* value, int16_t* out);
-bool bitestream_get_i32(const bitestream_value* value, int32_t* out);
-bool bitestream_get_i64(const bitestream_value* value, int64_t* out);
-bool bitestream_get_f32(const bitestream_value* value, float* out);
-bool bitestream_get_f64(const bitestream_value* value, double* out);
+GIMNET_API bool bitestream_get_u8(const bitestream_value* value, uint8_t* out);
+GIMNET_API bool bitestream_get_u16(const bitestream_value* value, uint16_t* out);
+GIMNET_API bool bitestream_get_u32(const bitestream_value* value, uint32_t* out);
+GIMNET_API bool bitestream_get_u64(const bitestream_value* value, uint64_t* out);
+GIMNET_API bool bitestream_get_i8(const bitestream_value* value, int8_t* out);
+GIMNET_API bool bitestream_get_i16(const bitestream_value* value, int16_t* out);
+GIMNET_API bool bitestream_get_i32(const bitestream_value* value, int32_t* out);
+GIMNET_API bool bitestream_get_i64(const bitestream_value* value, int64_t* out);
+GIMNET_API bool bitestream_get_f32(const bitestream_value* value, float* out);
+GIMNET_API bool bitestream_get_f64(const bitestream_value* value, double* out);
 /* False: another type, or (text) not UTF-8. */
-bool bitestream_get_bool(const bitestream_value* value, bool* out);
-bool bitestream_get_time(const bitestream_value* value, int64_t* ns);
-bool bitestream_get_text(const bitestream_value* value, const char** text, size_t* size);
-bool bitestream_get_opaque(const bitestream_value* value, const void** bytes, size_t* size);
-bool bitestream_get_nested(const bitestream_value* value, bitestream_reader* nested);
+GIMNET_API bool bitestream_get_bool(const bitestream_value* value, bool* out);
+GIMNET_API bool bitestream_get_time(const bitestream_value* value, int64_t* ns);
+GIMNET_API bool bitestream_get_text(const bitestream_value* value, const char** text, size_t* size);
+GIMNET_API bool bitestream_get_opaque(const bitestream_value* value, const void** bytes,
+                                      size_t* size);
+GIMNET_API bool bitestream_get_nested(const bitestream_value* value, bitestream_reader* nested);
 /* Elements of an array; 0 for everything else. */
-size_t bitestream_count(const bitestream_value* value);
+GIMNET_API size_t bitestream_count(const bitestream_value* value);
 /* One element as a value of its own. False: not an array, or no such element. */
-bool bitestream_element(const bitestream_value* value, size_t index, bitestream_value* element);
+GIMNET_API bool bitestream_element(const bitestream_value* value, size_t index,
+                                   bitestream_value* element);
 
 #ifdef __cplusplus
 }

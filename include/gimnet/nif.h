@@ -179,13 +179,13 @@ typedef struct nif_options {
  * NIF_BAD_NAME, NIF_HUB_FULL, NIF_REFUSED, NIF_PROTOCOL, NIF_NO_MEMORY, NIF_LIMIT (too many
  * handles), NIF_SYSTEM. On failure *node is NULL. options may be NULL: all defaults.
  */
-nif_status nif_connect(const nif_options* options, nif_node** node);
+GIMNET_API nif_status nif_connect(const nif_options* options, nif_node** node);
 
 /** Leaves for good: writes what still waits (for at most one second), says GOODBYE, so that name
  * and id are free at once, and frees the handle. Calls of other threads that wait on it return
  * NIF_CLOSED first. Messages received and not released stay valid. NIF_CLOSED: no such handle.
  * NIF_IN_CALLBACK: called from this handle's callback. */
-nif_status nif_close(nif_node* node);
+GIMNET_API nif_status nif_close(nif_node* node);
 
 /** State of a handle at one moment. */
 typedef struct nif_info {
@@ -210,16 +210,16 @@ typedef struct nif_info {
 
 /** Fills *info, as much of it as struct_size says. Does not wait. NIF_BAD_ARGUMENT: NULL, or
  * struct_size is not set. */
-nif_status nif_get_info(nif_node* node, nif_info* info);
+GIMNET_API nif_status nif_get_info(nif_node* node, nif_info* info);
 
 /** The node id, or 0 if there is no such handle. */
-uint32_t nif_id(nif_node* node);
+GIMNET_API uint32_t nif_id(nif_node* node);
 
 /** Copies the sentence of the last trouble of the connection itself (why it broke, what the hub's
  * GOODBYE said), empty if there was none, into buffer, cut between characters to at most size - 1
  * bytes. Returns the length that it has uncut; 0 also if there is no such handle. buffer may be
  * NULL if size is 0. */
-size_t nif_last_error(nif_node* node, char* buffer, size_t size);
+GIMNET_API size_t nif_last_error(nif_node* node, char* buffer, size_t size);
 
 /* ---------------------------------------------------------------- sending */
 
@@ -322,23 +322,23 @@ typedef struct nif_outgoing {
  * fragmented message that the hub reported undeliverable. NIF_NOT_RETAINED: sent, but larger than
  * what the hub keeps of a service with retain. NIF_REFUSED: to the group of a service that the hub
  * did not take again. NIF_BAD_ARGUMENT, NIF_NO_MEMORY. */
-nif_status nif_send(nif_node* node, const nif_outgoing* message, int32_t timeout_ms);
+GIMNET_API nif_status nif_send(nif_node* node, const nif_outgoing* message, int32_t timeout_ms);
 
 /** nif_send() of one piece to one node in the normal lane, with the default policy, without a time
  * limit. */
-nif_status nif_send_to(nif_node* node, uint32_t to, const void* data, size_t size);
+GIMNET_API nif_status nif_send_to(nif_node* node, uint32_t to, const void* data, size_t size);
 
 /** Writes what NIF_FLAG_MORE held back. Does not wait: what the kernel does not take now goes
  * without further calls. NIF_NOT_CONNECTED, NIF_REPLACED, NIF_REFUSED: no connection will come any
  * more. */
-nif_status nif_flush(nif_node* node);
+GIMNET_API nif_status nif_flush(nif_node* node);
 
 /** Waits until everything sent so far was given to the kernel and, where resume is on, confirmed by
  * the hub. NIF_NOT_CONNECTED: broken without resume; or, once after each such loss, frames sent
  * since the last nif_drain() were given up unconfirmed, because the hub that came back does not
  * know this connection, or had left the resume buffer: some may not have arrived. NIF_TIMEOUT,
  * NIF_CLOSED, NIF_REPLACED. */
-nif_status nif_drain(nif_node* node, int32_t timeout_ms);
+GIMNET_API nif_status nif_drain(nif_node* node, int32_t timeout_ms);
 
 /* ---------------------------------------------------------------- receiving */
 
@@ -449,26 +449,26 @@ typedef struct nif_incoming {
 /** Takes the next message or event. NIF_TIMEOUT: none within timeout_ms. Those received before the
  * connection broke still come, then NIF_NOT_CONNECTED (with no_reconnect) or NIF_REPLACED.
  * NIF_BAD_ARGUMENT if a callback was set. */
-nif_status nif_receive(nif_node* node, nif_incoming* in, int32_t timeout_ms);
+GIMNET_API nif_status nif_receive(nif_node* node, nif_incoming* in, int32_t timeout_ms);
 
 /** Takes up to `capacity` at once: waits for the first only. Stores the number in *count. As
  * nif_receive(). */
-nif_status nif_receive_many(nif_node* node, nif_incoming* in, size_t capacity, size_t* count,
-                            int32_t timeout_ms);
+GIMNET_API nif_status nif_receive_many(nif_node* node, nif_incoming* in, size_t capacity,
+                                       size_t* count, int32_t timeout_ms);
 
 /** Gives back what a receive function or a callback that answers NIF_KEEP got. Once for each. NULL
  * is ignored. */
-void nif_release(nif_incoming* in);
+GIMNET_API void nif_release(nif_incoming* in);
 
 /** A descriptor that polls readable while something waits for nif_receive(). Do not read from it,
  * do not close it. -1 if there is no such handle or no descriptor. Valid until: nif_close(). */
-int nif_event_fd(nif_node* node);
+GIMNET_API int nif_event_fd(nif_node* node);
 
 /** After NIF_NOT_NOW: there is room again, the library's thread calls the callback again with what
  * waits. Does not wait; may be called in the callback. Nothing happens where nothing was held back.
  * No errors beside those of handles.
  */
-nif_status nif_deliver(nif_node* node);
+GIMNET_API nif_status nif_deliver(nif_node* node);
 
 #ifdef __cplusplus
 }

@@ -46,7 +46,7 @@ typedef struct nif_counters {
 
 /** Fills *counters, as much of it as struct_size says. Does not wait. NIF_BAD_ARGUMENT: NULL, or
  * struct_size is not set. */
-nif_status nif_get_counters(nif_node* node, nif_counters* counters);
+GIMNET_API nif_status nif_get_counters(nif_node* node, nif_counters* counters);
 
 #ifdef __cplusplus
 }

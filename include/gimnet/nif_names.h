@@ -25,11 +25,12 @@ typedef struct nif_node nif_node;
 /** Finds a node by its name. An answer is remembered for a second, and forgotten earlier where a
  * REPORT says no_such_node or renumbered, and at every break. NIF_NOT_FOUND, NIF_BAD_NAME,
  * NIF_TIMEOUT, NIF_NOT_CONNECTED. */
-nif_status nif_resolve(nif_node* node, const char* name, uint32_t* id, int32_t timeout_ms);
+GIMNET_API nif_status nif_resolve(nif_node* node, const char* name, uint32_t* id,
+                                  int32_t timeout_ms);
 
 /** Finds the name of a node, "" for one without a name; remembered as those of nif_resolve().
  * `name` must have room for NIF_NAME_BYTES_MAX + 1 bytes. NIF_NOT_FOUND. */
-nif_status nif_reverse(nif_node* node, uint32_t id, char* name, int32_t timeout_ms);
+GIMNET_API nif_status nif_reverse(nif_node* node, uint32_t id, char* name, int32_t timeout_ms);
 
 /** One node of a list. Text: NUL-terminated, never NULL. */
 typedef struct nif_node_record {
@@ -52,9 +53,9 @@ typedef struct nif_node_list {
 /** Lists the nodes whose name matches the pattern (`*` one part, `**` any number; NULL: all nodes,
  * also those without a name) into *list, which nif_free_nodes() frees. It is asked for in pages:
  * nodes that come or go meanwhile may be in it or not. NIF_BAD_NAME: no pattern. */
-nif_status nif_list_nodes(nif_node* node, const char* pattern, nif_node_list** list,
-                          int32_t timeout_ms);
-void nif_free_nodes(nif_node_list* list);
+GIMNET_API nif_status nif_list_nodes(nif_node* node, const char* pattern, nif_node_list** list,
+                                     int32_t timeout_ms);
+GIMNET_API void nif_free_nodes(nif_node_list* list);
 
 typedef enum nif_direction { NIF_PROVIDES = 0, NIF_ACCEPTS = 1 } nif_direction;
 /** The messages that a subscriber gets: all; only the newest of those that wait; or, of sync(n), at
@@ -87,18 +88,18 @@ typedef struct nif_service {
  * subscribers wait for it already. The library declares it again after every reconnect, under the
  * former group id where the hub can. NIF_BAD_NAME, NIF_TAKEN (this node has such a service),
  * NIF_LIMIT, NIF_DENIED (a node without a name). */
-nif_status nif_advertise(nif_node* node, const nif_service* service, uint32_t* group,
-                         uint32_t* subscribers, int32_t timeout_ms);
+GIMNET_API nif_status nif_advertise(nif_node* node, const nif_service* service, uint32_t* group,
+                                    uint32_t* subscribers, int32_t timeout_ms);
 
 /** Ends an own service. NIF_NOT_FOUND; NIF_DENIED: it is another node's; NIF_BAD_ARGUMENT: group is
  * 0. */
-nif_status nif_withdraw(nif_node* node, uint32_t group, int32_t timeout_ms);
+GIMNET_API nif_status nif_withdraw(nif_node* node, uint32_t group, int32_t timeout_ms);
 
 /** The same by its name, whatever group it has by now: also of a service that the hub moved or
  * refuses at the moment. The library declares it no more, whatever this answers; where the hub
  * could not be told within the time given, it is as soon as there is a connection. NIF_NOT_FOUND:
  * this node has no such service. NIF_BAD_NAME. */
-nif_status nif_withdraw_service(nif_node* node, const char* name, int32_t timeout_ms);
+GIMNET_API nif_status nif_withdraw_service(nif_node* node, const char* name, int32_t timeout_ms);
 
 /** One service of a list. Text: NUL-terminated, never NULL. */
 typedef struct nif_service_record {
@@ -122,9 +123,9 @@ typedef struct nif_service_list {
 } nif_service_list;
 
 /** Lists services by a pattern of full names, as nif_list_nodes(). */
-nif_status nif_list_services(nif_node* node, const char* pattern, nif_service_list** list,
-                             int32_t timeout_ms);
-void nif_free_services(nif_service_list* list);
+GIMNET_API nif_status nif_list_services(nif_node* node, const char* pattern,
+                                        nif_service_list** list, int32_t timeout_ms);
+GIMNET_API void nif_free_services(nif_service_list* list);
 
 /** The state of a subscription at the moment. */
 typedef struct nif_subscription {
@@ -153,27 +154,29 @@ typedef struct nif_pace {
 /** Subscribes to a service by its full name; it need not exist yet. The library subscribes again
  * after every reconnect. subscription may be NULL. NIF_BAD_NAME (also of a name without a /, which
  * no service has, and of a pattern, which nif_watch() takes), NIF_LIMIT, NIF_DENIED. */
-nif_status nif_subscribe(nif_node* node, const char* full_name, nif_subscription* subscription,
-                         int32_t timeout_ms);
+GIMNET_API nif_status nif_subscribe(nif_node* node, const char* full_name,
+                                    nif_subscription* subscription, int32_t timeout_ms);
 
 /** The same with a pace; NULL: none. Of a service that is subscribed already this changes it; where
  * the hub could not be told within the time given, it is with the next connection. Also
  * NIF_BAD_REQUEST: a number beyond the hub's limit.
  */
-nif_status nif_subscribe_paced(nif_node* node, const char* full_name, const nif_pace* pace,
-                               nif_subscription* subscription, int32_t timeout_ms);
+GIMNET_API nif_status nif_subscribe_paced(nif_node* node, const char* full_name,
+                                          const nif_pace* pace, nif_subscription* subscription,
+                                          int32_t timeout_ms);
 
 /** With nif_options.credit_by_program: the program took so many messages of the group that came
  * with this nif_incoming.epoch. The hub is told at once, or, with `more`, when half of the window
  * was taken: more is waiting to be taken anyway. An epoch of 0, an earlier one, and groups without
  * a window are ignored. Does not wait; may be called in the callback. No errors beside those of
  * handles: while the connection is broken it is told after it is back. */
-nif_status nif_credit(nif_node* node, uint32_t group, uint32_t epoch, uint32_t messages, int more);
+GIMNET_API nif_status nif_credit(nif_node* node, uint32_t group, uint32_t epoch, uint32_t messages,
+                                 int more);
 
 /** Ends a subscription. NIF_NOT_FOUND. Messages that are on their way already may still come. The
  * library subscribes to it no more, whatever this answers; where the hub could not be told within
  * the time given, it is as soon as there is a connection. */
-nif_status nif_unsubscribe(nif_node* node, const char* full_name, int32_t timeout_ms);
+GIMNET_API nif_status nif_unsubscribe(nif_node* node, const char* full_name, int32_t timeout_ms);
 
 /* ---------------------------------------------------------------- asking the hub */
 
@@ -209,19 +212,20 @@ typedef struct nif_reply {
 /** Sends a request (kind NIF_NS or NIF_CTRL, an operation below 0x8000, and its Bitestream) to the
  * own hub and waits for the answer. NIF_OK: *reply holds it, whatever its status. NIF_BAD_ARGUMENT
  * also: another kind or operation, or more than NIF_REQUEST_BYTES_MAX bytes of content. */
-nif_status nif_request(nif_node* node, uint8_t kind, uint16_t operation, const void* content,
-                       size_t size, nif_reply** reply, int32_t timeout_ms);
+GIMNET_API nif_status nif_request(nif_node* node, uint8_t kind, uint16_t operation,
+                                  const void* content, size_t size, nif_reply** reply,
+                                  int32_t timeout_ms);
 /** The same of another hub of the network; hub_id 0 is the own hub. Requests that change a hub are
  * answered `denied` there. */
-nif_status nif_request_of_hub(nif_node* node, uint32_t hub_id, uint8_t kind, uint16_t operation,
-                              const void* content, size_t size, nif_reply** reply,
-                              int32_t timeout_ms);
-void nif_free_reply(nif_reply* reply);
+GIMNET_API nif_status nif_request_of_hub(nif_node* node, uint32_t hub_id, uint8_t kind,
+                                         uint16_t operation, const void* content, size_t size,
+                                         nif_reply** reply, int32_t timeout_ms);
+GIMNET_API void nif_free_reply(nif_reply* reply);
 
 /** Measures the way to the hub with one FLOW PING: round trip and hub's clock minus this one, in
  * ns; either may be NULL. The clock offset is good to half of the round trip. */
-nif_status nif_ping_hub(nif_node* node, int64_t* round_trip_ns, int64_t* clock_offset_ns,
-                        int32_t timeout_ms);
+GIMNET_API nif_status nif_ping_hub(nif_node* node, int64_t* round_trip_ns, int64_t* clock_offset_ns,
+                                   int32_t timeout_ms);
 
 #ifdef __cplusplus
 }

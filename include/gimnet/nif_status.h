@@ -3,6 +3,8 @@
 
 /* The answers of NIF's calls, and reasons for messages not to arrive. Included by gimnet/nif.h. */
 
+#include "gimnet/export.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -51,7 +53,7 @@ typedef enum nif_status {
 } nif_status;
 
 /** A short English text for a status, for example "name taken". Never NULL; static. */
-const char* nif_status_text(nif_status status);
+GIMNET_API const char* nif_status_text(nif_status status);
 
 /** Longest sentence of nif_error_text() in bytes, without the terminating NUL. */
 #define NIF_SENTENCE_BYTES_MAX 1024
@@ -59,7 +61,7 @@ const char* nif_status_text(nif_status status);
 /** A sentence about the last call of this thread that did not answer NIF_OK or NIF_TIMEOUT: what
  * happened, to what, what to do, in UTF-8. Never NULL. A longer one than NIF_SENTENCE_BYTES_MAX is
  * cut between two characters. Valid until: the next nif_* call of this thread. */
-const char* nif_error_text(void);
+GIMNET_API const char* nif_error_text(void);
 
 /** Why frames did not arrive: nif_incoming.reason of a NIF_REPORT and a NIF_GAP. The numbers are
  * those of the wire, and their meaning is in docs/protocol.md, section 5; later versions may have

@@ -18,11 +18,11 @@ extern "C" {
  * NIF_OWN_SERVICE_MOVED. NIF_NAME_LOST tells should a node of another hub have the better claim to
  * the name. NIF_TAKEN (a live node holds it; the sentence says which), NIF_BAD_NAME,
  * NIF_TIMEOUT, NIF_NOT_CONNECTED. */
-nif_status nif_register(nif_node* node, const char* name, int32_t timeout_ms);
+GIMNET_API nif_status nif_register(nif_node* node, const char* name, int32_t timeout_ms);
 
 /** Gives the own name back; the node goes on without one. Its services are withdrawn, and come back
  * should it take a name again. NIF_NOT_FOUND: it has none. */
-nif_status nif_unregister(nif_node* node, int32_t timeout_ms);
+GIMNET_API nif_status nif_unregister(nif_node* node, int32_t timeout_ms);
 
 /* ---------------------------------------------------------------- watching */
 
@@ -73,21 +73,21 @@ typedef struct nif_watched {
  * asks for a new snapshot, and after a reconnect it goes on where it was, or with a new snapshot. A
  * program that does not receive is told less often, not slower than others. NIF_BAD_NAME (no
  * pattern), NIF_BAD_ARGUMENT, NIF_LIMIT, NIF_TIMEOUT, NIF_NOT_CONNECTED. */
-nif_status nif_watch(nif_node* node, const char* pattern, uint32_t subjects, uint32_t* watch,
-                     int32_t timeout_ms);
+GIMNET_API nif_status nif_watch(nif_node* node, const char* pattern, uint32_t subjects,
+                                uint32_t* watch, int32_t timeout_ms);
 
 /** Asks for a new snapshot of a watch: for programs that threw away what they were told.
  * NIF_NOT_FOUND. */
-nif_status nif_watch_again(nif_node* node, uint32_t watch, int32_t timeout_ms);
+GIMNET_API nif_status nif_watch_again(nif_node* node, uint32_t watch, int32_t timeout_ms);
 
 /** For a watch with NIF_WATCH_BY_HAND: one that was `last` has been seen to, the hub may send more.
  * Does not wait; may be called in the callback. A number that no watch has is ignored. No errors
  * beside those of handles: while the connection is broken there is nothing to tell, and the hub
  * begins to count anew. */
-nif_status nif_watch_taken(nif_node* node, uint32_t watch);
+GIMNET_API nif_status nif_watch_taken(nif_node* node, uint32_t watch);
 
 /** Ends a watch. NIF_NOT_FOUND. Events received before still come. */
-nif_status nif_unwatch(nif_node* node, uint32_t watch, int32_t timeout_ms);
+GIMNET_API nif_status nif_unwatch(nif_node* node, uint32_t watch, int32_t timeout_ms);
 
 #ifdef __cplusplus
 }

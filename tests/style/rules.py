@@ -63,7 +63,8 @@ MAY_INCLUDE = {
     "examples": _GIMI + ("examples",),
 }
 # Public headers belong to the part that implements them.
-PUBLIC_HEADERS = (("gimnet/bitestream", "proto"), ("gimnet/nif", "client/nif"), ("gimnet/gimi", "client/gimi"))
+PUBLIC_HEADERS = (("gimnet/export", "base"), ("gimnet/bitestream", "proto"), ("gimnet/nif", "client/nif"),
+                  ("gimnet/gimi", "client/gimi"))
 
 _SOCKETS = ("sys/socket.h", "sys/un.h", "sys/epoll.h", "netinet/", "arpa/", "netdb.h", "poll.h", "boost/asio")
 _THREADS = ("thread", "mutex", "shared_mutex", "atomic", "condition_variable", "future", "semaphore", "latch",
