@@ -1,17 +1,21 @@
 #pragma once
 
+#include <charconv>
 #include <compare>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <type_traits>
+#include <utility>
 
-namespace gimnet {
+#include "gimnet/gimi_message.h"
+
+namespace gimnet::inline v0_9 {
 
 /// A node as others address it: hub << 20 | index, printed `7.17`. 0 is nobody. A value type.
 struct Peer {
@@ -19,10 +23,31 @@ struct Peer {
 
   [[nodiscard]] explicit operator bool() const { return id != 0; }
   /// `7.17`
-  [[nodiscard]] std::string text() const;
+  [[nodiscard]] std::string text() const {
+    return std::to_string(id >> kIndexBits) + "." + std::to_string(id & kIndexMax);
+  }
   /// Reads `7.17`; nothing for other text.
-  [[nodiscard]] static std::optional<Peer> parse(std::string_view text);
+  [[nodiscard]] static std::optional<Peer> parse(std::string_view text) {
+    const auto point = text.find('.');
+    if (point == std::string_view::npos) return std::nullopt;
+    const auto hub = number(text.substr(0, point), UINT32_MAX >> kIndexBits);
+    const auto index = number(text.substr(point + 1), kIndexMax);
+    if (!hub || !index) return std::nullopt;
+    return Peer{(*hub << kIndexBits) | *index};
+  }
   friend constexpr auto operator<=>(const Peer&, const Peer&) = default;
+
+ private:
+  static constexpr unsigned kIndexBits = 20;
+  static constexpr std::uint32_t kIndexMax = (1u << kIndexBits) - 1;
+  [[nodiscard]] static std::optional<std::uint32_t> number(std::string_view text,
+                                                           std::uint32_t max) {
+    std::uint32_t value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error != std::errc() || end != text.data() + text.size() || value > max)
+      return std::nullopt;
+    return value;
+  }
 };
 
 /// The kind of a message: it selects a queue of the receiver. The numbers, any of 32 bits, are
@@ -35,6 +60,9 @@ struct MessageKey {
 
 /// A lower lane goes first at every queue; there is no order between lanes.
 enum class Lane : std::uint8_t { real_time = 0, normal = 1, bulk = 2, background = 3 };
+[[nodiscard]] constexpr gimi_lane lane_number(Lane lane) {
+  return static_cast<gimi_lane>(lane) + 1;
+}
 
 /// Bytes to send, looked at and never kept: text, or any contiguous range of bytes or characters.
 class BytesView {
@@ -68,71 +96,70 @@ class BytesView {
 class Message {
  public:
   Message() = default;
-  Message(Message&& other) noexcept { swap(other); }
+  /// Takes over what the library gave out.
+  explicit Message(const gimi_message& taken) : message_(taken) {}
+  Message(Message&& other) noexcept : message_(other.give_up()) {}
   Message& operator=(Message&& other) noexcept {
     Message old(std::move(other));
-    swap(old);
+    std::swap(message_, old.message_);
     return *this;
   }
   Message(const Message&) = delete;
   Message& operator=(const Message&) = delete;
-  ~Message();
+  ~Message() {
+    if (message_.storage != nullptr || message_.name_storage != nullptr)
+      gimi_message_release(&message_);
+  }
 
   /// Valid until: this message is destroyed or moved from.
-  [[nodiscard]] std::span<const std::byte> data() const { return data_; }
-  [[nodiscard]] std::string_view text() const {
-    return {reinterpret_cast<const char*>(data_.data()), data_.size()};
+  [[nodiscard]] std::span<const std::byte> data() const {
+    return {static_cast<const std::byte*>(message_.data), message_.size};
   }
-  [[nodiscard]] std::size_t size() const { return data_.size(); }
+  [[nodiscard]] std::string_view text() const {
+    return {static_cast<const char*>(message_.data), message_.size};
+  }
+  [[nodiscard]] std::size_t size() const { return message_.size; }
 
   /// Its sender: the first hub vouches for it.
-  [[nodiscard]] Peer from() const { return from_; }
-  [[nodiscard]] MessageKey key() const { return key_; }
-  [[nodiscard]] Lane lane() const { return lane_; }
+  [[nodiscard]] Peer from() const { return {message_.from}; }
+  [[nodiscard]] MessageKey key() const { return {message_.key.type, message_.key.instance}; }
+  [[nodiscard]] Lane lane() const { return static_cast<Lane>(message_.lane - 1); }
   /// Counted by the sender for each (destination, key) from 1, and by a publisher for all its
   /// subscribers; after 2^32 - 1 comes 0.
-  [[nodiscard]] std::uint32_t sequence() const { return sequence_; }
+  [[nodiscard]] std::uint32_t sequence() const { return message_.sequence; }
   /// Its sender has begun the stream anew since the message before it: the sender is another
   /// process under the same id, say after `kill -9`. sequence() counts anew, and nothing was
   /// missed.
-  [[nodiscard]] bool begins_stream() const { return begins_stream_; }
+  [[nodiscard]] bool begins_stream() const { return has(GIMI_BEGINS_STREAM); }
   /// It was sent with NIF without a GIMI header: sequence() is 0, and so are type and instance of
   /// key().
-  [[nodiscard]] bool plain() const { return plain_; }
+  [[nodiscard]] bool plain() const { return has(GIMI_PLAIN); }
   /// It was published with Delivery::latest: gaps in sequence() are what was skipped for newer
   /// ones.
-  [[nodiscard]] bool latest() const { return latest_; }
+  [[nodiscard]] bool latest() const { return has(GIMI_OF_LATEST); }
   /// When it was sent, by the sender's clock in ns since 1970, if the sender stamped it.
-  [[nodiscard]] std::optional<std::int64_t> sent_ns() const { return sent_ns_; }
+  [[nodiscard]] std::optional<std::int64_t> sent_ns() const {
+    return has(GIMI_STAMPED) ? std::optional(message_.sent_ns) : std::nullopt;
+  }
   /// When it was read from the network, by this machine's clock in ns since 1970.
-  [[nodiscard]] std::int64_t arrival_ns() const { return arrival_ns_; }
+  [[nodiscard]] std::int64_t arrival_ns() const { return message_.arrival_ns; }
   /// NodeState::reconnects of its node when it came: if it grows from one message to the next, the
   /// connection to the hub was broken between them.
-  [[nodiscard]] std::uint32_t reconnects() const { return reconnects_; }
+  [[nodiscard]] std::uint32_t reconnects() const { return message_.reconnects; }
   /// Full name of the service it was published by; "" for one that was sent to this node.
   [[nodiscard]] std::string_view service() const {
-    return service_ ? std::string_view{*service_} : "";
+    return message_.service != nullptr ? message_.service : "";
   }
 
- private:
-  friend struct MessageAccess;
-  void swap(Message& other) noexcept;
+  /// As the C functions have it; it stays this message's.
+  [[nodiscard]] const gimi_message& c_message() const { return message_; }
+  /// The same, which is the caller's from then on, to release; this message is empty.
+  [[nodiscard]] gimi_message give_up() noexcept { return std::exchange(message_, {}); }
 
-  std::span<const std::byte> data_;
-  void* storage_ = nullptr;
-  std::shared_ptr<const std::string> service_;
-  std::optional<std::int64_t> sent_ns_;
-  std::int64_t arrival_ns_ = 0;
-  Peer from_;
-  MessageKey key_;
-  std::uint32_t sequence_ = 0;
-  std::uint32_t reconnects_ = 0;
-  Lane lane_ = Lane::normal;
-  bool begins_stream_ = false;
-  bool plain_ = false;
-  bool latest_ = false;
-  std::uint32_t group_ = 0;
-  std::uint32_t epoch_ = 0;  ///< of a message that counts in a window
+ private:
+  [[nodiscard]] bool has(std::uint32_t flag) const { return (message_.flags & flag) != 0; }
+
+  gimi_message message_{};
 };
 
-}  // namespace gimnet
+}  // namespace gimnet::inline v0_9

@@ -7,7 +7,7 @@
 
 // The state of a node's connection, and its losses. Value types.
 
-namespace gimnet {
+namespace gimnet::inline v0_9 {
 
 /// State of a node's connection at one moment.
 struct NodeState {
@@ -51,4 +51,4 @@ struct LostCounts {
   }
 };
 
-}  // namespace gimnet
+}  // namespace gimnet::inline v0_9

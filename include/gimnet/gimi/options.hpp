@@ -9,7 +9,7 @@
 #include "gimnet/gimi/outcome.hpp"
 #include "gimnet/gimi/records.hpp"
 
-namespace gimnet {
+namespace gimnet::inline v0_9 {
 
 /// Most messages of one (destination, key) that may wait for their ACK: what one ACK can speak of.
 inline constexpr std::size_t kWindowMax = 64;
@@ -68,7 +68,7 @@ struct NodeOptions {
 };
 
 /// The behaviour of a full queue when a message comes.
-enum class AtFullQueue : std::uint8_t {
+enum class AtFullQueue : std::int32_t {
   overwrite_oldest,  ///< a ring buffer: the oldest goes and is counted; of size 1 it holds the
                      ///< newest
   /// Nothing goes: the node stops reading from the hub, for all its queues, until there is room.
@@ -84,7 +84,7 @@ struct QueueOptions {
 };
 
 /// The behaviour of a sender when as much as its window allows is not acknowledged.
-enum class AtFullWindow : std::uint8_t {
+enum class AtFullWindow : std::int32_t {
   wait,         ///< until there is room, at most the time given to send()
   skip,         ///< send nothing and answer Status::window_full
   hold_latest,  ///< keep this one, in place of one that is kept already, and send it when there is
@@ -149,4 +149,4 @@ struct WatchOptions {
 /// that is not. A program that stops there calls Node::flush().
 enum class More : std::uint8_t { no, yes };
 
-}  // namespace gimnet
+}  // namespace gimnet::inline v0_9

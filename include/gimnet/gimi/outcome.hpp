@@ -1,80 +1,95 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
+#include <cstdio>
+#include <cstdlib>
 #include <stdexcept>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <variant>
 
-namespace gimnet {
+#include "gimnet/gimi_types.h"
+
+namespace gimnet::inline v0_9 {
 
 /// The longest wait of a call. 0 does not wait; kForever (any negative time) waits without a limit.
 using Timeout = std::chrono::milliseconds;
 inline constexpr Timeout kForever{-1};
 inline constexpr Timeout kNoWait{0};
 
-/// Why a call did not do what it was asked.
-enum class Status : std::uint8_t {
-  timeout,        ///< The time given was not enough. Try again.
-  closed,         ///< The node was closed.
-  bad_argument,   ///< A parameter is outside its range: a mistake of the program.
-  no_hub,         ///< Nothing answers at the hub's address.
-  no_host,        ///< No address is known for the host in the hub's URL.
-  not_connected,  ///< The connection is broken at the moment.
-  bad_version,    ///< The hub speaks another major version of the protocol.
-  name_taken,     ///< Another live node holds the name.
-  bad_name,       ///< The name breaks the rules (docs/protocol.md, section 8).
-  refused,    ///< The hub is full, draining, or ended the session: kicked, or replaced by another
-              ///< connection.
-  not_found,  ///< No node or service of that name.
-  taken,      ///< This node has such a service already.
-  denied,     ///< This node may not do that.
-  limit,      ///< A limit of the hub or of the library was reached.
-  too_large,  ///< The message is larger than allowed.
-  not_delivered,  ///< The message is known not to have arrived.
-  window_full,    ///< AtFullWindow::skip: nothing was sent.
-  protocol,       ///< The peer sent bytes that docs/protocol.md forbids.
-  system,         ///< The operating system refused, or memory is out.
-  forked,         ///< The node belongs to the parent process: after fork(), join anew in the child.
-  not_retained,   ///< The message was published, but is not kept for those who subscribe later.
+/// A timeout as the C functions take it.
+[[nodiscard]] inline std::int32_t milliseconds_of(Timeout timeout) {
+  if (timeout < Timeout{0}) return GIMI_FOREVER;
+  return static_cast<std::int32_t>(std::min<std::int64_t>(timeout.count(), INT32_MAX));
+}
+/// The same in options, where 0 means the default.
+[[nodiscard]] inline std::int32_t milliseconds_in_options(Timeout timeout) {
+  return std::max(milliseconds_of(timeout), timeout < Timeout{0} ? GIMI_FOREVER : 1);
+}
+
+/// Why a call did not do what it was asked. gimnet/gimi_types.h explains them.
+enum class Status : std::int32_t {
+  ok = GIMI_OK,
+  timeout = GIMI_TIMEOUT,
+  closed = GIMI_CLOSED,
+  bad_argument = GIMI_BAD_ARGUMENT,
+  no_hub = GIMI_NO_HUB,
+  no_host = GIMI_NO_HOST,
+  not_connected = GIMI_NOT_CONNECTED,
+  bad_version = GIMI_BAD_VERSION,
+  name_taken = GIMI_NAME_TAKEN,
+  bad_name = GIMI_BAD_NAME,
+  refused = GIMI_REFUSED,
+  not_found = GIMI_NOT_FOUND,
+  taken = GIMI_TAKEN,
+  denied = GIMI_DENIED,
+  limit = GIMI_LIMIT,
+  too_large = GIMI_TOO_LARGE,
+  not_delivered = GIMI_NOT_DELIVERED,
+  window_full = GIMI_WINDOW_FULL,
+  protocol = GIMI_PROTOCOL,
+  system = GIMI_SYSTEM,
+  forked = GIMI_FORKED,
+  not_retained = GIMI_NOT_RETAINED,
 };
 
-/// Why a message did not arrive.
-enum class LossReason : std::uint8_t {
-  none = 0,  ///< None was lost.
-  // As the hub reported it: docs/protocol.md, section 5. Later hubs may have more, below 64.
-  no_such_node = 1,
-  no_route = 2,
-  away = 3,
-  queue_full = 4,
-  replaced = 5,
-  too_old = 6,
-  hop_limit = 7,
-  too_large = 8,
-  not_allowed = 9,
-  wrong_way = 10,
-  link_lost = 11,
-  shard_full = 12,
-  no_such_group = 13,
-  renumbered = 14,
-  over_budget = 15,
-  timed_out = 16,
-  cut_message = 17,
-  no_subscriber = 18,
-  malformed = 19,
-  wrong_source = 20,
-  link_unsure = 22,
-  // As this node knows by itself.
-  not_received = 64,     ///< Its receiver answered a later question, but did not get it.
-  refused = 65,          ///< Its receiver does not take it: it is too large.
-  connection_lost = 66,  ///< The own connection broke, or ended.
-  service_gone = 67,  ///< The service was withdrawn or is somewhere else, and cannot tell any more.
+/// Why a message did not arrive. gimnet/gimi_types.h explains them.
+enum class LossReason : std::int32_t {
+  none = GIMI_LOSS_NONE,
+  no_such_node = GIMI_LOSS_NO_SUCH_NODE,
+  no_route = GIMI_LOSS_NO_ROUTE,
+  away = GIMI_LOSS_AWAY,
+  queue_full = GIMI_LOSS_QUEUE_FULL,
+  replaced = GIMI_LOSS_REPLACED,
+  too_old = GIMI_LOSS_TOO_OLD,
+  hop_limit = GIMI_LOSS_HOP_LIMIT,
+  too_large = GIMI_LOSS_TOO_LARGE,
+  not_allowed = GIMI_LOSS_NOT_ALLOWED,
+  wrong_way = GIMI_LOSS_WRONG_WAY,
+  link_lost = GIMI_LOSS_LINK_LOST,
+  shard_full = GIMI_LOSS_SHARD_FULL,
+  no_such_group = GIMI_LOSS_NO_SUCH_GROUP,
+  renumbered = GIMI_LOSS_RENUMBERED,
+  over_budget = GIMI_LOSS_OVER_BUDGET,
+  timed_out = GIMI_LOSS_TIMED_OUT,
+  cut_message = GIMI_LOSS_CUT_MESSAGE,
+  no_subscriber = GIMI_LOSS_NO_SUBSCRIBER,
+  malformed = GIMI_LOSS_MALFORMED,
+  wrong_source = GIMI_LOSS_WRONG_SOURCE,
+  link_unsure = GIMI_LOSS_LINK_UNSURE,
+  not_received = GIMI_LOSS_NOT_RECEIVED,
+  refused = GIMI_LOSS_REFUSED,
+  connection_lost = GIMI_LOSS_CONNECTION_LOST,
+  service_gone = GIMI_LOSS_SERVICE_GONE,
 };
 
 /// A short English text, for example "name taken". Static.
-[[nodiscard]] std::string_view status_text(Status status);
+[[nodiscard]] inline std::string_view status_text(Status status) {
+  return gimi_status_text(static_cast<gimi_status>(status));
+}
 
 /// Why there is no value: for programs a status, for people what happened, to what, and what to do.
 struct Failure {
@@ -82,6 +97,7 @@ struct Failure {
   std::string sentence;
 };
 
+#if defined(__cpp_exceptions)
 /// The exception of the throwing forms of the API.
 class GimnetError : public std::runtime_error {
  public:
@@ -93,9 +109,22 @@ class GimnetError : public std::runtime_error {
  private:
   Failure failure_;
 };
+[[noreturn]] inline void fail_without_value(const Failure& failure) { throw GimnetError(failure); }
+#else
+[[noreturn]] inline void fail_without_value(const Failure& failure) {
+  std::fputs(failure.sentence.c_str(), stderr);
+  std::abort();
+}
+#endif
+
+/// The last failure of a C function in this thread.
+[[nodiscard]] inline Failure failure_of(gimi_status status) {
+  return {static_cast<Status>(status), gimi_error_text()};
+}
 
 /// A value, or a Failure. Calls never throw by themselves; `node.find("b").or_throw()` does.
-/// Thread safety: as the value's. Errors: value() without one throws GimnetError.
+/// Thread safety: as the value's. Errors: value() without one throws GimnetError, and
+/// ends a program without exceptions, for which or_throw() is not declared.
 template <class T>
 class [[nodiscard]] Outcome {
  public:
@@ -114,10 +143,12 @@ class [[nodiscard]] Outcome {
     check();
     return *std::get_if<0>(&state_);
   }
+#if defined(__cpp_exceptions)
   [[nodiscard]] T or_throw() && {
     check();
     return std::move(*std::get_if<0>(&state_));
   }
+#endif
   [[nodiscard]] T& operator*() & { return value(); }
   [[nodiscard]] const T& operator*() const& { return value(); }
   [[nodiscard]] T* operator->() { return &value(); }
@@ -131,7 +162,7 @@ class [[nodiscard]] Outcome {
 
  private:
   void check() const {
-    if (const auto* failed = std::get_if<1>(&state_)) throw GimnetError(*failed);
+    if (const auto* failed = std::get_if<1>(&state_)) fail_without_value(*failed);
   }
 
   std::variant<T, Failure> state_;
@@ -146,9 +177,11 @@ class [[nodiscard]] Outcome<void> {
 
   [[nodiscard]] bool ok() const { return ok_; }
   [[nodiscard]] explicit operator bool() const { return ok_; }
+#if defined(__cpp_exceptions)
   void or_throw() const {
-    if (!ok_) throw GimnetError(failure_);
+    if (!ok_) fail_without_value(failure_);
   }
+#endif
   [[nodiscard]] const Failure& failure() const { return failure_; }
   [[nodiscard]] bool is(Status status) const { return !ok_ && failure_.status == status; }
 
@@ -157,4 +190,4 @@ class [[nodiscard]] Outcome<void> {
   Failure failure_;
 };
 
-}  // namespace gimnet
+}  // namespace gimnet::inline v0_9

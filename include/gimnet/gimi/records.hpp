@@ -11,16 +11,16 @@
 
 // The records of a hub, its nodes and its services. Value types.
 
-namespace gimnet {
+namespace gimnet::inline v0_9 {
 
 /// A way to deliver: `stream` every message, in order, the oldest going when its queue at the
 /// hub is full; `latest` only the newest of those that wait; `sync` at most a window of messages
 /// that it has not taken, its hub holding the newest meanwhile, so that each subscriber gets fresh
 /// ones at its own rate.
-enum class Delivery : std::uint8_t { stream = 0, latest = 1, sync = 2 };
+enum class Delivery : std::int32_t { stream = 0, latest = 1, sync = 2 };
 
 /// A service gives data to its subscribers, or takes data that others send to it.
-enum class Direction : std::uint8_t { provides = 0, accepts = 1 };
+enum class Direction : std::int32_t { provides = 0, accepts = 1 };
 
 struct NodeRecord {
   Peer node;
@@ -49,7 +49,7 @@ struct ServiceRecord {
 };
 
 /// The kinds of events of a watch.
-enum class Change : std::uint8_t {
+enum class Change : std::int32_t {
   snapshot_begins =
       0,              ///< all told before is void: at first, and when the watch was too far behind
   present = 1,        ///< part of the snapshot
@@ -65,7 +65,9 @@ enum class Change : std::uint8_t {
   ended = 255,     ///< after a reconnect the hub did not take the watch again; `why` tells
 };
 /// "joined" and so on; "unknown" for a change of a later version. Static.
-[[nodiscard]] std::string_view change_text(Change change);
+[[nodiscard]] inline std::string_view change_text(Change change) {
+  return gimi_change_text(static_cast<gimi_change>(change));
+}
 
 /// A node or a service that is there or changed, or neither for what is about the watch itself.
 struct WatchEvent {
@@ -182,4 +184,4 @@ struct ConnectionRecord {
   std::uint64_t dropped = 0;     ///< frames that were for it
 };
 
-}  // namespace gimnet
+}  // namespace gimnet::inline v0_9

@@ -32,12 +32,8 @@ std::size_t nif_bytes_max(std::size_t message_bytes_max) {
 
 Core::Core(const NodeOptions& options)
     : inbox_(
-          options.queue_messages, options.receive_bytes,
-          [this] { static_cast<void>(nif_deliver(node())); },
-          [this](const TakenMessages& taken, bool more) {
-            static_cast<void>(
-                nif_credit(node(), taken.group, taken.epoch, taken.count, more ? 1 : 0));
-          }),
+          options.queue_messages, options.receive_bytes, [this] { uplink_.deliver(); },
+          [this](const TakenMessages& taken, bool more) { uplink_.credit(taken, more); }),
       streams_(uplink_, [this](bool at_once) { clerk_.attend(at_once); }),
       services_(uplink_, inbox_,
                 [this](const std::string& name, const ServicePlace& place) {

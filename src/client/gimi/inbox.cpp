@@ -154,7 +154,14 @@ bool Inbox::is_room_wanted(const MessageQueue& queue) {
   return true;
 }
 
-Outcome<Message> Inbox::receive(MessageQueue& queue, Timeout timeout) {
+void Inbox::leave(MessageQueue& queue, std::atomic<bool>& left) {
+  const MutexLock lock(mutex_);
+  left = true;
+  queue.filled().notify_all();
+}
+
+Outcome<Message> Inbox::receive(MessageQueue& queue, Timeout timeout,
+                                const std::atomic<bool>* left) {
   const std::int64_t deadline = deadline_after(timeout);
   std::optional<Message> message;
   News news;
@@ -162,6 +169,7 @@ Outcome<Message> Inbox::receive(MessageQueue& queue, Timeout timeout) {
     const MutexLock lock(mutex_);
     while (queue.empty()) {
       if (end_) return end_.failure("receive");
+      if (left != nullptr && *left) return Failure{Status::closed, "the handle was closed"};
       if (is_over(deadline)) return none(timeout);
       static_cast<void>(queue.filled().wait_until(mutex_, deadline));
     }

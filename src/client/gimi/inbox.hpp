@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -10,7 +11,6 @@
 
 #include "base/mutex.hpp"
 #include "client/gimi/ending.hpp"
-#include "client/gimi/home.hpp"
 #include "client/gimi/message_queue.hpp"
 #include "gimnet/gimi/outcome.hpp"
 
@@ -48,9 +48,6 @@ class Inbox {
         on_room_(std::move(on_room)),
         on_taken_(std::move(on_taken)) {}
 
-  [[nodiscard]] const Home& home() const { return home_; }
-  /// In a child after fork() there is only this queue, which nobody fills.
-  [[nodiscard]] MessageQueue& empty_queue() { return empty_queue_; }
   /// The queue of a key, made if there is none; with `options` changed to them.
   MessageQueue& queue(MessageKey key, const QueueOptions* options) GIMNET_EXCLUDES(mutex_);
   /// A queue for a subscription, until remove().
@@ -72,8 +69,12 @@ class Inbox {
   void count_dropped() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::uint64_t dropped() GIMNET_EXCLUDES(mutex_);
 
-  [[nodiscard]] Outcome<Message> receive(MessageQueue& queue, Timeout timeout)
+  /// `left`: set by leave(), in which case the answer is `closed`; null: nobody calls that.
+  [[nodiscard]] Outcome<Message> receive(MessageQueue& queue, Timeout timeout,
+                                         const std::atomic<bool>* left = nullptr)
       GIMNET_EXCLUDES(mutex_);
+  /// Sets `left` and has those that receive with it leave.
+  void leave(MessageQueue& queue, std::atomic<bool>& left) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] Outcome<Message> receive_any(Timeout timeout) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::optional<Message> try_receive(MessageQueue& queue) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::optional<Message> take_newest(MessageQueue& queue) GIMNET_EXCLUDES(mutex_);
@@ -108,8 +109,6 @@ class Inbox {
   [[nodiscard]] News news_of(MessageQueue& queue) GIMNET_REQUIRES(mutex_);
   void tell(const News& news) const GIMNET_EXCLUDES(mutex_);
 
-  const Home home_;
-  MessageQueue empty_queue_{*this, {}, 0};
   const std::size_t unasked_messages_;
   const std::size_t bytes_max_;
   const std::function<void()> on_room_;

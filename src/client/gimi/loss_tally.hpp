@@ -7,7 +7,7 @@
 #include <string_view>
 #include <utility>
 
-#include "gimnet/gimi.hpp"
+#include "gimnet/gimi/node_state.hpp"
 #include "gimnet/gimi/outcome.hpp"
 #include "proto/frame/frame_header.hpp"
 

@@ -1,32 +1,46 @@
 #pragma once
 
-#include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <string>
 
+#include "client/nif/storage.hpp"
 #include "gimnet/gimi/message.hpp"
 #include "gimnet/nif.h"
 #include "proto/gimi/message_header.hpp"
 
-namespace gimnet {
+namespace gimnet::gimi {
 
-/// How the library makes Messages of what NIF received.
-struct MessageAccess {
-  /// Takes over the storage of `in`, which is released with the message.
-  [[nodiscard]] static Message make(const nif_incoming& in, const proto::gimi::MessageView& view,
-                                    std::shared_ptr<const std::string> service,
-                                    std::uint32_t reconnects);
-  /// As make(), of bytes without a GIMI header.
-  [[nodiscard]] static Message make_plain(const nif_incoming& in, std::span<const std::byte> data,
-                                          std::shared_ptr<const std::string> service,
-                                          std::uint32_t reconnects);
-  static void begin_stream(Message& message) { message.begins_stream_ = true; }
-  /// The group and epoch in which it counts; epoch 0: in none.
-  [[nodiscard]] static std::uint32_t group_of(const Message& message) { return message.group_; }
-  [[nodiscard]] static std::uint32_t epoch_of(const Message& message) { return message.epoch_; }
-  /// Gives the storage back to who holds `in`.
-  static void disown(Message& message) { message.storage_ = nullptr; }
+/// The full name of a service, which its messages keep. Thread safety: any thread; it does not
+/// change.
+class ServiceName final : public nif::Storage {
+ public:
+  explicit ServiceName(std::string name) : text(std::move(name)) {}
+  const std::string text;
 };
+struct ReleaseServiceName {
+  void operator()(ServiceName* name) const { name->release(); }
+};
+using OwnedServiceName = std::unique_ptr<ServiceName, ReleaseServiceName>;
 
-}  // namespace gimnet
+/// A message of what NIF received: takes over the storage of `in`. `service` may be null.
+[[nodiscard]] Message make_message(const nif_incoming& in, const proto::gimi::MessageView& view,
+                                   ServiceName* service, std::uint32_t reconnects);
+/// The same of bytes without a GIMI header.
+[[nodiscard]] Message make_plain_message(const nif_incoming& in, std::span<const std::byte> data,
+                                         ServiceName* service, std::uint32_t reconnects);
+/// The message, whose sender began the stream anew.
+[[nodiscard]] Message begin_stream(Message message);
+/// Gives the storage back to who holds NIF's message.
+void disown(Message message);
+
+/// The group and epoch in which a message counts; epoch 0: in none.
+[[nodiscard]] inline std::uint32_t group_of(const Message& message) {
+  return message.c_message().counted[0];
+}
+[[nodiscard]] inline std::uint32_t epoch_of(const Message& message) {
+  return message.c_message().counted[1];
+}
+
+}  // namespace gimnet::gimi

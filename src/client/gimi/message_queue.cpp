@@ -55,9 +55,9 @@ std::optional<Message> MessageQueue::pop_newest() {
 }
 
 void MessageQueue::count_taken(const Message& message) {
-  const std::uint32_t epoch = MessageAccess::epoch_of(message);
+  const std::uint32_t epoch = epoch_of(message);
   if (epoch == 0) return;
-  const std::uint32_t group = MessageAccess::group_of(message);
+  const std::uint32_t group = group_of(message);
   if (taken_.empty() || taken_.back().group != group || taken_.back().epoch != epoch) {
     taken_.push_back({group, epoch, 0});
   }

@@ -128,12 +128,12 @@ nif_verdict Reception::on_data(const nif_incoming& in, const proto::gimi::Messag
   StreamEpochs& epochs = received_.find({name.peer, in.kind, name.group, name.key});
   const StreamEpochs::Step step = epochs.look(view.header.epoch);
   if (step == StreamEpochs::Step::former) return drop_outdated();
-  Message message = MessageAccess::make(in, view, nullptr, reconnects_);
-  if (step == StreamEpochs::Step::begins) MessageAccess::begin_stream(message);
+  Message message = make_message(in, view, nullptr, reconnects_);
+  if (step == StreamEpochs::Step::begins) message = begin_stream(std::move(message));
   AckReceipt receipt(clerk_, name, static_cast<Lane>(in.lane), view.header);
   const bool wanted = is_for_one(in) && view.header.has(proto::gimi::kFlagAckWanted);
   if (!inbox_.put(name.key, message, wanted ? &receipt : nullptr)) {
-    MessageAccess::disown(message);
+    disown(std::move(message));
     return NIF_NOT_NOW;
   }
   epochs.take(view.header.epoch);
@@ -147,19 +147,20 @@ nif_verdict Reception::on_plain(const nif_incoming& in) {
     return NIF_DONE;
   }
   MessageQueue* queue = nullptr;
-  std::shared_ptr<const std::string> service_name;
+  ServiceTable::Subscribed service;
   if (in.kind == NIF_GROUP) {
-    const auto [place, service] = services_.subscribed(in.group != 0 ? in.group : in.to);
+    auto [place, found] = services_.subscribed(in.group != 0 ? in.group : in.to);
     if (place == ServiceTable::Place::unknown) losses_.add_unknown_service();
-    if (service == nullptr) return verdict_of(place);
-    queue = &service->queue();
-    service_name = service->shared_name();
+    if (found == nullptr) return verdict_of(place);
+    queue = &found->queue();
+    service = std::move(found);
   }
-  Message message = MessageAccess::make_plain(in, data, std::move(service_name), reconnects_);
+  ServiceName* const name = service == nullptr ? nullptr : &service->shared_name();
+  Message message = make_plain_message(in, data, name, reconnects_);
   const bool taken = queue != nullptr ? inbox_.put(*queue, message, nullptr)
                                       : inbox_.put(MessageKey{}, message, nullptr);
   if (taken) return NIF_KEEP;
-  MessageAccess::disown(message);
+  disown(std::move(message));
   return NIF_NOT_NOW;
 }
 
@@ -180,10 +181,10 @@ nif_verdict Reception::on_group_data(const nif_incoming& in, const proto::gimi::
   if (service->is_repeated(position)) return NIF_DONE;
   const StreamEpochs::Step step = service->look(position);
   if (step == StreamEpochs::Step::former) return drop_outdated();
-  Message message = MessageAccess::make(in, view, service->shared_name(), reconnects_);
-  if (step == StreamEpochs::Step::begins) MessageAccess::begin_stream(message);
+  Message message = make_message(in, view, &service->shared_name(), reconnects_);
+  if (step == StreamEpochs::Step::begins) message = begin_stream(std::move(message));
   if (!inbox_.put(service->queue(), message, nullptr)) {
-    MessageAccess::disown(message);
+    disown(std::move(message));
     return NIF_NOT_NOW;
   }
   service->on_message(position);

@@ -11,7 +11,7 @@
 #include "client/gimi/loss_tally.hpp"
 #include "client/gimi/send_window.hpp"
 #include "client/gimi/uplink.hpp"
-#include "gimnet/gimi.hpp"
+#include "gimnet/gimi/handles.hpp"
 
 namespace gimnet::gimi {
 
@@ -61,7 +61,6 @@ class SendStream {
         place_(place),
         destination_{NIF_SERVICE, place.destination(), place.key, Uplink::draw_epoch()},
         window_(options.window) {}
-  [[nodiscard]] const Home& home() const { return uplink_.home(); }
 
   [[nodiscard]] Outcome<void> send(BytesView data, Timeout timeout, More more)
       GIMNET_EXCLUDES(mutex_);

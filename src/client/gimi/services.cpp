@@ -168,10 +168,11 @@ Outcome<void> SubscribedService::wait_until_exists(Timeout timeout) {
   const std::int64_t deadline = deadline_after(timeout);
   const MutexLock lock(mutex_);
   while (!exists_) {
-    if (end_) return end_.failure("wait for " + *name_);
+    if (end_) return end_.failure("wait for " + name_->text);
     if (is_over(deadline)) {
-      return Failure{Status::timeout, accepts_ ? *name_ + " takes data and gives none; send to it"
-                                               : "nobody provides " + *name_ + " yet"};
+      return Failure{Status::timeout, accepts_
+                                          ? name_->text + " takes data and gives none; send to it"
+                                          : "nobody provides " + name_->text + " yet"};
     }
     static_cast<void>(changed_.wait_until(mutex_, deadline));
   }
@@ -192,11 +193,11 @@ QueueOptions SubscribedService::queue_options() const {
 
 Outcome<void> SubscribedService::standing() {
   const MutexLock lock(mutex_);
-  if (end_) return end_.failure("subscribe " + *name_);
+  if (end_) return end_.failure("subscribe " + name_->text);
   if (!refusal_) return {};
   return Failure{
       refusal_->status,
-      "cannot subscribe " + *name_ +
+      "cannot subscribe " + name_->text +
           ": the hub did not take the subscription again, after a break: " + refusal_->sentence};
 }
 

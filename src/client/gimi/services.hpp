@@ -11,11 +11,12 @@
 #include "base/mutex.hpp"
 #include "client/gimi/ending.hpp"
 #include "client/gimi/inbox.hpp"
+#include "client/gimi/message.hpp"
 #include "client/gimi/message_queue.hpp"
 #include "client/gimi/received_streams.hpp"
 #include "client/gimi/send_stream.hpp"
 #include "client/gimi/uplink.hpp"
-#include "gimnet/gimi.hpp"
+#include "gimnet/gimi/handles.hpp"
 #include "gimnet/gimi/options.hpp"
 #include "gimnet/gimi/outcome.hpp"
 
@@ -31,7 +32,6 @@ class PublishedService {
         name_(std::move(name)),
         options_(options),
         full_name_(std::move(full_name)) {}
-  [[nodiscard]] const Home& home() const { return uplink_.home(); }
 
   [[nodiscard]] const std::string& name() const { return name_; }
   /// As it is now; without the node's name while the node has none.
@@ -88,15 +88,13 @@ class PublishedService {
 class SubscribedService {
  public:
   SubscribedService(std::string full_name, Inbox& inbox, const QueueOptions& options)
-      : name_(std::make_shared<const std::string>(std::move(full_name))),
-        queue_(inbox.add_queue(options)) {}
+      : name_(new ServiceName(std::move(full_name))), queue_(inbox.add_queue(options)) {}
   ~SubscribedService() { queue_.inbox().remove(queue_); }
   SubscribedService(const SubscribedService&) = delete;
   SubscribedService& operator=(const SubscribedService&) = delete;
-  [[nodiscard]] const Home& home() const { return queue_.inbox().home(); }
 
-  [[nodiscard]] const std::shared_ptr<const std::string>& shared_name() const { return name_; }
-  [[nodiscard]] const std::string& name() const { return *name_; }
+  [[nodiscard]] ServiceName& shared_name() const { return *name_; }
+  [[nodiscard]] const std::string& name() const { return name_->text; }
   [[nodiscard]] MessageQueue& queue() const { return queue_; }
 
   /// There is a provider.
@@ -154,7 +152,7 @@ class SubscribedService {
   };
   [[nodiscard]] Stream* find(const Position& message) GIMNET_REQUIRES(mutex_);
 
-  const std::shared_ptr<const std::string> name_;
+  const OwnedServiceName name_;
   MessageQueue& queue_;
 
   Mutex mutex_;

@@ -5,6 +5,7 @@
 
 #include "base/clock.hpp"
 #include "base/random.hpp"
+#include "client/nif/api.hpp"
 
 namespace gimnet::gimi {
 
@@ -89,7 +90,31 @@ nif_status Uplink::transmit(const Envelope& envelope, proto::gimi::MessageHeader
   outgoing.part_count = parts.size();
   outgoing.age_ms_max = envelope.age_max_ms;
   outgoing.trace_slots = envelope.trace_slots;
-  return nif_send(node(), &outgoing, timeout_ms);
+  nif::Node* const direct = direct_.load();
+  if (direct == nullptr) return NIF_CLOSED;
+  return nif::guarded([&] { return direct->send(outgoing, timeout_ms); });
+}
+
+void Uplink::open(nif_node* node) {
+  direct_.store(nif::share_node(node));
+  node_.store(node);
+}
+
+Uplink::~Uplink() {
+  if (nif::Node* const direct = direct_.load()) direct->drop();
+}
+
+void Uplink::credit(const TakenMessages& taken, bool more) const {
+  nif::Node* const direct = direct_.load();
+  if (direct == nullptr || taken.epoch == 0) return;
+  static_cast<void>(nif::guarded([&]() -> nif_status {
+    direct->credits().take(taken.group, taken.epoch, taken.count, more);
+    return NIF_OK;
+  }));
+}
+
+void Uplink::deliver() const {
+  if (nif::Node* const direct = direct_.load()) direct->deliver_again();
 }
 
 std::string Uplink::trouble() const {

@@ -7,11 +7,16 @@
 #include <string_view>
 
 #include "base/ids.hpp"
-#include "client/gimi/home.hpp"
+#include "client/gimi/message_queue.hpp"
+#include "client/nif/platform.hpp"
 #include "gimnet/gimi/message.hpp"
 #include "gimnet/gimi/outcome.hpp"
 #include "gimnet/nif.h"
 #include "proto/gimi/message_header.hpp"
+
+namespace gimnet::nif {
+class Node;
+}  // namespace gimnet::nif
 
 namespace gimnet::gimi {
 
@@ -39,11 +44,27 @@ struct Envelope {
 /// Hubs of a way that a traced message tells of; as many as NIF allows.
 inline constexpr std::uint8_t kTraceHopsMax = 8;
 
-/// The way to NIF: GIMI messages in, frames out. Thread safety: any thread. The handle stays usable
-/// when it was closed; NIF then answers NIF_CLOSED.
+/// The process in which a part of a node was made. A child after fork() has a copy of it, whose
+/// locks and threads are its parent's. Thread safety: any thread.
+class Home {
+ public:
+  [[nodiscard]] bool left() const { return generation_ != nif::fork_generation(); }
+
+ private:
+  const std::uint32_t generation_ = nif::fork_generation();
+};
+
+/// The way to NIF: GIMI messages in, frames out. What happens for each message goes to NIF's node
+/// itself, everything else by its handle. Thread safety: any thread. Both stay usable when the
+/// handle was closed; NIF then answers NIF_CLOSED.
 class Uplink {
  public:
-  void open(nif_node* node) { node_.store(node); }
+  Uplink() = default;
+  ~Uplink();
+  Uplink(const Uplink&) = delete;
+  Uplink& operator=(const Uplink&) = delete;
+
+  void open(nif_node* node);
   [[nodiscard]] const Home& home() const { return home_; }
   /// Null: not connected for the first time yet.
   [[nodiscard]] nif_node* node() const { return node_.load(); }
@@ -51,6 +72,10 @@ class Uplink {
   /// As nif_send(); `stamped`: with the time of this call.
   [[nodiscard]] nif_status transmit(const Envelope& envelope, proto::gimi::MessageHeader header,
                                     bool stamped, BytesView data, std::int32_t timeout_ms) const;
+
+  /// As nif_credit() and nif_deliver().
+  void credit(const TakenMessages& taken, bool more) const;
+  void deliver() const;
 
   /// nif_last_error(), whole.
   [[nodiscard]] std::string trouble() const;
@@ -63,6 +88,7 @@ class Uplink {
  private:
   const Home home_;
   std::atomic<nif_node*> node_{nullptr};
+  std::atomic<nif::Node*> direct_{nullptr};
   std::atomic<std::uint32_t> pings_{0};
 };
 

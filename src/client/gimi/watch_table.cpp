@@ -41,17 +41,6 @@ Outcome<WatchEvent> WatchQueue::receive(Timeout timeout) {
   return taken(std::move(entry));
 }
 
-std::optional<WatchEvent> WatchQueue::try_receive() {
-  Entry entry;
-  {
-    const MutexLock lock(mutex_);
-    if (entries_.empty()) return std::nullopt;
-    entry = std::move(entries_.front());
-    entries_.pop_front();
-  }
-  return taken(std::move(entry));
-}
-
 WatchEvent WatchQueue::taken(Entry entry) const {
   if (entry.last) static_cast<void>(nif_watch_taken(uplink_.node(), entry.watch));
   return std::move(entry.event);

@@ -4,13 +4,12 @@
 #include <deque>
 #include <map>
 #include <memory>
-#include <optional>
 #include <string>
 
 #include "base/mutex.hpp"
 #include "client/gimi/ending.hpp"
 #include "client/gimi/uplink.hpp"
-#include "gimnet/gimi.hpp"
+#include "gimnet/gimi/handles.hpp"
 
 namespace gimnet::gimi {
 
@@ -19,10 +18,8 @@ namespace gimnet::gimi {
 class WatchQueue {
  public:
   explicit WatchQueue(Uplink& uplink) : uplink_(uplink) {}
-  [[nodiscard]] const Home& home() const { return uplink_.home(); }
 
   [[nodiscard]] Outcome<WatchEvent> receive(Timeout timeout) GIMNET_EXCLUDES(mutex_);
-  [[nodiscard]] std::optional<WatchEvent> try_receive() GIMNET_EXCLUDES(mutex_);
 
   void put(WatchEvent event, std::uint32_t watch, bool last) GIMNET_EXCLUDES(mutex_);
   void end(const Ending& ending) GIMNET_EXCLUDES(mutex_);

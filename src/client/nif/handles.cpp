@@ -116,6 +116,13 @@ nif_node* add_node(std::unique_ptr<Node>& node) {
   return nullptr;
 }
 
+Node* share_node(const nif_node* handle) {
+  const NodeRef ref = find_node(handle);
+  if (!ref) return nullptr;
+  ref->add_owner();
+  return &*ref;
+}
+
 nif_status close_node(nif_node* handle) {
   std::uint32_t index = 0;
   {
@@ -140,7 +147,7 @@ nif_status close_node(nif_node* handle) {
   for (state = slot.state.load(); (state & kUsersMask) != 0; state = slot.state.load())
     slot.state.wait(state);
   node->close();
-  delete node;
+  node->drop();
   slot.node = nullptr;
   return NIF_OK;
 }

@@ -42,7 +42,12 @@ class NodeRef {
 /// stays the caller's.
 [[nodiscard]] nif_node* add_node(std::unique_ptr<Node>& node);
 
-/// Makes the handle invalid, has waiting calls leave, waits until they have, and closes the node.
+/// The node of a handle, for a library above this one that calls it without a look-up each time. It
+/// stays until that drops it; after close_node() it answers NIF_CLOSED. Null: no such handle.
+[[nodiscard]] Node* share_node(const nif_node* handle);
+
+/// Makes the handle invalid, has waiting calls leave, waits until they have, closes the node,
+/// and drops it.
 [[nodiscard]] nif_status close_node(nif_node* handle);
 
 }  // namespace gimnet::nif

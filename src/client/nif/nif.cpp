@@ -5,7 +5,6 @@
 
 #include "client/nif/api.hpp"
 #include "client/nif/error.hpp"
-#include "client/nif/outgoing.hpp"
 #include "client/nif/sized_struct.hpp"
 
 // The C API but for names and services.
@@ -77,10 +76,7 @@ size_t nif_last_error(nif_node* node, char* buffer, size_t size) {
 nif_status nif_send(nif_node* node, const nif_outgoing* message, int32_t timeout_ms) {
   return with_node(node, [&](Node& found) -> nif_status {
     if (message == nullptr) return fail(NIF_BAD_ARGUMENT, "cannot send: message is NULL");
-    gimnet::nif::Outgoing outgoing;
-    if (const auto failure = outgoing.read(*message, &found.clock())) return fail(*failure);
-    const bool may_wait = timeout_ms != 0 && !found.in_callback();
-    return found.outbound().send(outgoing, may_wait ? deadline_after(timeout_ms) : 0);
+    return found.send(*message, timeout_ms);
   });
 }
 

@@ -327,6 +327,13 @@ nif_counters Node::counters() {
   return whole;
 }
 
+nif_status Node::send(const nif_outgoing& message, std::int32_t timeout_ms) {
+  Outgoing outgoing;
+  if (const auto failure = outgoing.read(message, &clock_)) return fail(*failure);
+  const bool may_wait = timeout_ms != 0 && !in_callback();
+  return outbound_.send(outgoing, may_wait ? deadline_after(timeout_ms) : 0);
+}
+
 nif_status Node::ping_hub(HubClock::Measurement& measured, Deadline deadline) {
   const nif_status status = outbound_.wait_connected(deadline);
   if (status != NIF_OK) return status;

@@ -36,6 +36,12 @@ class Node final : private InboundHost {
   /// REQUIRES: close() was called, and no other thread is inside.
   ~Node();
 
+  /// A node has one owner at first, and is destroyed when the last one drops it.
+  void add_owner() { owners_.fetch_add(1); }
+  void drop() {
+    if (owners_.fetch_sub(1) == 1) delete this;
+  }
+
   [[nodiscard]] Outbound& outbound() { return outbound_; }
   [[nodiscard]] ReceiveQueue& received() { return received_; }
   [[nodiscard]] RequestTable& requests() { return requests_; }
@@ -59,6 +65,8 @@ class Node final : private InboundHost {
   /// Connections after the first. Grows before anything is declared on the new connection.
   [[nodiscard]] std::uint32_t reconnects() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] nif_counters counters() GIMNET_EXCLUDES(mutex_);
+  /// As nif_send().
+  [[nodiscard]] nif_status send(const nif_outgoing& message, std::int32_t timeout_ms);
   [[nodiscard]] std::string last_error() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] nif_status ping_hub(HubClock::Measurement& measured, Deadline deadline);
   /// The callback has room again.
@@ -148,6 +156,7 @@ class Node final : private InboundHost {
   std::atomic<std::uint32_t> id_{0};
   std::atomic<bool> closing_{false};
   std::atomic<std::uint32_t> deliver_calls_{0};
+  std::atomic<std::uint32_t> owners_{1};
 
   Mutex mutex_;
   nif_info info_ GIMNET_GUARDED_BY(mutex_){};

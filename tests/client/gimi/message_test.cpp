@@ -41,6 +41,22 @@ TEST(Message, Moves) {
   EXPECT_EQ(second.text(), "other");
 }
 
+TEST(Message, ItsMemoryIsGivenBackOnce) {
+  auto* const storage = nif::Slab::make();
+  storage->add_reference();
+  nif_incoming in{};
+  in.storage = static_cast<nif::Storage*>(storage);
+  gimi_message message = gimi::make_message(in, {}, nullptr, 0).give_up();
+  EXPECT_FALSE(storage->is_only_reference());
+  gimi_message_release(&message);
+  EXPECT_TRUE(storage->is_only_reference());
+  EXPECT_EQ(message.storage, nullptr);
+  gimi_message_release(&message);
+  gimi_message_release(nullptr);
+  EXPECT_TRUE(storage->is_only_reference());
+  storage->release();
+}
+
 TEST(BytesView, LooksAtAnyBytes) {
   const std::string text = "abc";
   const std::vector<std::byte> bytes{std::byte{1}, std::byte{2}};

@@ -16,7 +16,7 @@ inline Message make_counted(std::uint32_t group, std::uint32_t epoch) {
   in.kind = NIF_GROUP;
   in.to = group;
   in.epoch = epoch;
-  return MessageAccess::make(in, {}, nullptr, 0);
+  return gimi::make_message(in, {}, nullptr, 0);
 }
 
 /// A message that NIF knows nothing of, of a service if one is named. `text` must outlive it.
@@ -32,9 +32,8 @@ inline Message make_message(std::string_view text, std::uint32_t sequence = 1, M
   proto::gimi::MessageView view;
   view.header.sequence = sequence;
   view.data = std::as_bytes(std::span(text.data(), text.size()));
-  return MessageAccess::make(
-      in, view, service.empty() ? nullptr : std::make_shared<const std::string>(service),
-      reconnects);
+  const gimi::OwnedServiceName name(service.empty() ? nullptr : new gimi::ServiceName(service));
+  return gimi::make_message(in, view, name.get(), reconnects);
 }
 
 }  // namespace gimnet::test

@@ -1,4 +1,4 @@
-#include "client/gimi/home.hpp"
+#include "client/gimi/uplink.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/wait.h>

@@ -1,9 +1,11 @@
-#include "gimnet/gimi/outcome.hpp"
+#include "client/gimi/failure.hpp"
 
 #include <gtest/gtest.h>
 
 #include <set>
 #include <string>
+#include <string_view>
+#include <thread>
 
 namespace gimnet {
 namespace {
@@ -45,11 +47,28 @@ TEST(Outcome, OfNothing) {
 
 TEST(Outcome, EveryStatusHasItsOwnText) {
   std::set<std::string_view> texts;
-  for (int status = 0; status <= static_cast<int>(Status::not_retained); ++status) {
-    texts.insert(status_text(static_cast<Status>(status)));
-  }
-  EXPECT_EQ(texts.size(), static_cast<std::size_t>(Status::not_retained) + 1);
+  for (gimi_status status = GIMI_OK; status <= GIMI_NOT_RETAINED; ++status)
+    texts.insert(gimi_status_text(status));
+  for (const gimi_status status : {GIMI_NOT_TRUSTED, GIMI_NO_RIGHT, GIMI_EXPIRED})
+    texts.insert(gimi_status_text(status));
+  EXPECT_EQ(texts.size(), std::size_t{GIMI_NOT_RETAINED} + 1 + 3);
   EXPECT_FALSE(texts.contains("unknown status"));
+  for (const gimi_status status : {GIMI_NOT_RETAINED + 1, GIMI_EXPIRED + 1, -1, INT32_MIN})
+    EXPECT_STREQ(gimi_status_text(status), "unknown status");
+}
+
+TEST(Failure, ItsSentenceBelongsToTheThread) {
+  EXPECT_EQ(gimi::fail(GIMI_LIMIT, "too many"), GIMI_LIMIT);
+  std::thread([] {
+    EXPECT_STREQ(gimi_error_text(), "");
+    static_cast<void>(gimi::fail(GIMI_LIMIT, "another"));
+  }).join();
+  EXPECT_STREQ(gimi_error_text(), "too many");
+}
+
+TEST(Failure, ALongSentenceIsCut) {
+  static_cast<void>(gimi::fail(GIMI_LIMIT, std::string(GIMI_SENTENCE_BYTES_MAX + 1, 'x')));
+  EXPECT_EQ(std::string_view(gimi_error_text()).size(), std::size_t{GIMI_SENTENCE_BYTES_MAX});
 }
 
 }  // namespace

@@ -1,0 +1,182 @@
+#pragma once
+
+#include <cstddef>
+#include <cstring>
+#include <exception>
+#include <memory>
+#include <new>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "client/gimi/core.hpp"
+#include "client/gimi/failure.hpp"
+#include "client/gimi/object_table.hpp"
+#include "client/nif/error.hpp"
+#include "client/nif/sized_struct.hpp"
+#include "gimnet/gimi.h"
+
+// The common parts of the functions of gimnet/gimi.h: what their handles stand for, and guards.
+
+namespace gimnet::gimi {
+
+using SharedCore = std::shared_ptr<Core>;
+
+struct NodeObject final : Object {
+  static constexpr HandleKind kKind = HandleKind::node;
+  explicit NodeObject(SharedCore the_core) : core(std::move(the_core)) {}
+  void end() override { core->close(); }
+  void abandon() override { core->close(); }
+  const SharedCore core;
+};
+
+struct PublisherObject final : Object {
+  static constexpr HandleKind kKind = HandleKind::publisher;
+  PublisherObject(SharedCore the_core, PublishedService& the_service)
+      : core(std::move(the_core)), service(the_service) {}
+  ~PublisherObject() override { core->services().withdraw(service); }
+  void end() override { service.end({Status::closed, "the service was withdrawn"}); }
+  const SharedCore core;
+  PublishedService& service;
+};
+
+/// A handle to receive from, beside a node.
+struct Source : Object {
+  Source(SharedCore the_core, MessageQueue& the_queue)
+      : core(std::move(the_core)), queue(the_queue) {}
+  void end() override { core->inbox().leave(queue, closed); }
+  const SharedCore core;
+  MessageQueue& queue;
+  std::atomic<bool> closed{false};  ///< the handle was, whatever becomes of the queue
+};
+
+struct SubscriptionObject final : Source {
+  static constexpr HandleKind kKind = HandleKind::subscription;
+  SubscriptionObject(SharedCore the_core, ServiceTable::Subscribed the_service)
+      : Source(std::move(the_core), the_service->queue()), service(std::move(the_service)) {}
+  ~SubscriptionObject() override { core->services().unsubscribe(service); }
+  const ServiceTable::Subscribed service;
+};
+
+struct QueueObject final : Source {
+  static constexpr HandleKind kKind = HandleKind::queue;
+  using Source::Source;
+};
+
+struct SenderObject final : Object {
+  static constexpr HandleKind kKind = HandleKind::sender;
+  SenderObject(SharedCore the_core, StreamTable::Stream the_stream)
+      : core(std::move(the_core)), stream(std::move(the_stream)) {}
+  const SharedCore core;  ///< outlives the stream
+  const StreamTable::Stream stream;
+};
+
+struct WatchObject final : Object {
+  static constexpr HandleKind kKind = HandleKind::watch;
+  WatchObject(SharedCore the_core, WatchTable::Begun the_watch)
+      : core(std::move(the_core)), watch(std::move(the_watch)) {}
+  ~WatchObject() override { core->watches().unwatch(watch.number); }
+  void end() override { watch.queue->end({Status::closed, "the watch was closed"}); }
+  const SharedCore core;
+  const WatchTable::Begun watch;
+};
+
+/// Runs `body` so that no exception crosses into C.
+template <class Body>
+gimi_status guarded(const Body& body) noexcept {
+  try {
+    return body();
+  } catch (const std::bad_alloc&) {
+    return fail(GIMI_SYSTEM, "out of memory");
+  } catch (const std::exception& error) {
+    return fail(GIMI_SYSTEM, error.what());
+  }
+}
+
+/// Runs `body` with the object that the handle stands for, unless there is none of that kind.
+template <class ObjectOf, class Body>
+gimi_status with(gimi_handle handle, const Body& body) noexcept {
+  const ObjectRef ref = find_object(handle);
+  if (ref.object() == nullptr || ref.kind() != ObjectOf::kKind) return no_object(ref);
+  return guarded([&] { return body(static_cast<ObjectOf&>(*ref.object())); });
+}
+
+template <class Body>
+gimi_status with_core(gimi_handle node, const Body& body) noexcept {
+  return with<NodeObject>(node, [&](NodeObject& object) { return body(*object.core); });
+}
+
+/// The same for a subscription or a queue.
+template <class Body>
+gimi_status with_source(gimi_handle handle, const Body& body) noexcept {
+  const ObjectRef ref = find_object(handle);
+  const bool fits = ref.kind() == HandleKind::subscription || ref.kind() == HandleKind::queue;
+  if (ref.object() == nullptr || !fits) return no_object(ref);
+  return guarded([&] { return body(static_cast<Source&>(*ref.object())); });
+}
+
+template <class Value>
+gimi_status answer(const Outcome<Value>& outcome) {
+  return outcome ? GIMI_OK : fail(outcome.failure());
+}
+
+inline gimi_status is_null(const char* what) {
+  return fail(GIMI_BAD_ARGUMENT, std::string(what) + " is NULL");
+}
+
+inline Timeout timeout_of(std::int32_t timeout_ms) { return Timeout{timeout_ms}; }
+/// Of a member of options.
+inline Timeout timeout_in_options(std::int32_t timeout_ms) {
+  return Timeout{timeout_ms == 0 ? 5000 : timeout_ms};
+}
+inline std::string text_of(const char* text) { return text == nullptr ? "" : text; }
+inline BytesView bytes_of(const void* data, std::size_t size) {
+  return std::string_view(static_cast<const char*>(data), size);
+}
+inline BytesView bytes_of(const gimi_bytes* bytes) {
+  return bytes == nullptr ? BytesView() : bytes_of(bytes->data, bytes->size);
+}
+inline MessageKey key_of(gimi_key key) { return {key.type, key.instance}; }
+
+/// False: no such lane. 0 is the normal one.
+inline bool read_lane(gimi_lane number, Lane& lane) {
+  lane = number == GIMI_LANE_DEFAULT ? Lane::normal : static_cast<Lane>(number - 1);
+  return number >= GIMI_LANE_DEFAULT && number <= GIMI_LANE_BACKGROUND;
+}
+
+inline gimi_status bad_lane(gimi_lane lane) {
+  return fail(GIMI_BAD_ARGUMENT, "there is no lane " + std::to_string(lane));
+}
+
+/// Copies as much as fits, cut between characters. REQUIRES: size is not 0.
+inline void copy_text(std::string_view text, char* buffer, std::size_t size) {
+  const std::string_view kept = nif::cut_text(text, size - 1);
+  std::memcpy(buffer, kept.data(), kept.size());
+  buffer[kept.size()] = '\0';
+}
+
+/// Options of the program, as this version of the library has them; null: all defaults.
+template <class Options, class Body>
+gimi_status with_options(const Options* given, const char* doing, const char* name,
+                         const Body& body) {
+  Options whole{};
+  if (given != nullptr) {
+    if (const auto fault = nif::read_struct(given, whole, doing, name))
+      return fail(GIMI_BAD_ARGUMENT, fault->sentence);
+  } else {
+    given = &whole;
+  }
+  return body(*given);
+}
+
+/// Gives an object to the program by a handle.
+template <class ObjectOf, class... Arguments>
+gimi_status give(gimi_handle* handle, Arguments&&... arguments) {
+  *handle = add_object(ObjectOf::kKind,
+                       std::make_unique<ObjectOf>(std::forward<Arguments>(arguments)...));
+  if (*handle != 0) return GIMI_OK;
+  static_assert(kHandlesMax == 1u << 20);  // as gimi.h says, too
+  return fail(GIMI_LIMIT, "this process has 1,048,576 open handles");
+}
+
+}  // namespace gimnet::gimi

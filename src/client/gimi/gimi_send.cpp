@@ -1,0 +1,162 @@
+#include <algorithm>
+
+#include "client/gimi/api.hpp"
+#include "client/gimi/hub_records.hpp"
+
+// The C API: streams to nodes and to services that accept.
+
+using namespace gimnet;
+using namespace gimnet::gimi;
+
+namespace {
+
+/// Reads the options and calls `body` with them.
+template <class Body>
+gimi_status with_send_options(const gimi_send_options* options, const Body& body) {
+  return with_options(options, "send", "gimi_send_options", [&](const auto& given) {
+    SendOptions how;
+    how.key = key_of(given.key);
+    if (!read_lane(given.lane, how.lane)) return bad_lane(given.lane);
+    how.window = given.window;
+    if (given.at_full < GIMI_WAIT || given.at_full > GIMI_HOLD_LATEST)
+      return fail(GIMI_BAD_ARGUMENT, "at_full is none of GIMI_WAIT, GIMI_SKIP, GIMI_HOLD_LATEST");
+    how.at_full = static_cast<AtFullWindow>(given.at_full);
+    how.timestamp = given.timestamp != 0;
+    how.age_max_ms = given.age_ms_max;
+    how.end_at_loss = given.end_at_loss != 0;
+    return body(how);
+  });
+}
+
+Outcome<StreamTable::Stream> stream_to_service(Core& core, const std::string& name,
+                                               const SendOptions& options, Timeout timeout) {
+  const auto found = list_services(core.node(), name, timeout);
+  if (!found) return found.failure();
+  // The listing takes patterns, too: only the service of that very name counts.
+  const auto service = std::ranges::find(*found, name, &ServiceRecord::name);
+  if (service == found->end()) {
+    return Failure{Status::not_found,
+                   "cannot send to '" + name +
+                       "': there is no such service at the moment; watch() tells when there is"};
+  }
+  if (service->direction != Direction::accepts) {
+    return Failure{Status::not_found,
+                   "cannot send to '" + name + "': it gives data and takes none; subscribe to it"};
+  }
+  StreamTable& streams = core.streams();
+  if (const auto ended = streams.make_place(name))
+    core.services().unfollow(*ended, [&] { return streams.has_service(*ended); });
+  return core.services().follow(name, timeout, [&](const ServicePlace& place) {
+    return streams.service_stream(name, place, options);
+  });
+}
+
+}  // namespace
+
+extern "C" {
+
+gimi_status gimi_accept(gimi_handle node, const char* name, const gimi_accept_options* options,
+                        gimi_handle* queue) {
+  if (name == nullptr || queue == nullptr) return is_null("gimi_accept(): name or queue");
+  *queue = 0;
+  return with<NodeObject>(node, [&](NodeObject& found) {
+    return with_options(options, "accept", "gimi_accept_options", [&](const auto& given) {
+      if (given.lease_ms != 0 || given.safe_message.data != nullptr)
+        return fail(GIMI_BAD_ARGUMENT, "this version of the library has no lease of a service");
+      AcceptOptions how;
+      how.key = key_of(given.key);
+      how.queue = {given.messages, static_cast<AtFullQueue>(given.at_full)};
+      how.metadata = text_of(given.metadata);
+      Core& core = *found.core;
+      MessageQueue& made = core.inbox().queue(how.key, &how.queue);
+      const auto accepted = core.services().accept(core.state().name, name, how,
+                                                   timeout_in_options(given.timeout_ms));
+      if (!accepted) return fail(accepted.failure());
+      return give<QueueObject>(queue, found.core, made);
+    });
+  });
+}
+
+gimi_status gimi_sender_to_service(gimi_handle node, const char* full_name,
+                                   const gimi_send_options* options, int32_t timeout_ms,
+                                   gimi_handle* sender) {
+  if (full_name == nullptr || sender == nullptr)
+    return is_null("gimi_sender_to_service(): full_name or sender");
+  *sender = 0;
+  return with<NodeObject>(node, [&](NodeObject& found) {
+    return with_send_options(options, [&](const SendOptions& how) {
+      auto stream = stream_to_service(*found.core, full_name, how, timeout_of(timeout_ms));
+      if (!stream) return fail(stream.failure());
+      return give<SenderObject>(sender, found.core, std::move(*stream));
+    });
+  });
+}
+
+gimi_status gimi_sender(gimi_handle node, gimi_peer to, const gimi_send_options* options,
+                        gimi_handle* sender) {
+  if (sender == nullptr) return is_null("gimi_sender(): sender");
+  *sender = 0;
+  return with<NodeObject>(node, [&](NodeObject& found) {
+    return with_send_options(options, [&](const SendOptions& how) {
+      auto stream = found.core->streams().stream(Peer{to}, how);
+      if (!stream) return fail(stream.failure());
+      return give<SenderObject>(sender, found.core, std::move(*stream));
+    });
+  });
+}
+
+gimi_status gimi_send(gimi_handle sender, const void* data, size_t size, int32_t timeout_ms,
+                      int32_t more) {
+  if (data == nullptr && size != 0) return is_null("gimi_send(): data");
+  return with<SenderObject>(sender, [&](SenderObject& found) {
+    return answer(found.stream->send(bytes_of(data, size), timeout_of(timeout_ms),
+                                     more != 0 ? More::yes : More::no));
+  });
+}
+
+gimi_status gimi_settle(gimi_handle sender, int32_t timeout_ms) {
+  return with<SenderObject>(sender, [&](SenderObject& found) {
+    return answer(found.stream->settle(timeout_of(timeout_ms)));
+  });
+}
+
+gimi_status gimi_sent(gimi_handle sender, gimi_send_counts* counts) {
+  return with<SenderObject>(sender, [&](SenderObject& found) -> gimi_status {
+    if (!nif::has_size(counts)) return is_null("gimi_sent(): counts, or its struct_size,");
+    const SendCounts now = found.stream->counts();
+    gimi_send_counts whole{};
+    whole.sent = now.sent;
+    whole.acknowledged = now.acknowledged;
+    whole.lost = now.lost;
+    whole.skipped = now.skipped;
+    whole.waiting = now.waiting;
+    whole.loss_reason = static_cast<gimi_loss_reason>(now.loss_reason);
+    copy_text(now.loss, whole.loss, sizeof whole.loss);
+    nif::write_struct(whole, *counts);
+    return GIMI_OK;
+  });
+}
+
+gimi_peer gimi_sends_to(gimi_handle sender) {
+  gimi_peer peer = 0;
+  static_cast<void>(with<SenderObject>(sender, [&](SenderObject& found) -> gimi_status {
+    peer = found.stream->to().id;
+    return GIMI_OK;
+  }));
+  return peer;
+}
+
+gimi_status gimi_send_to(gimi_handle node, gimi_peer to, const gimi_bytes* data,
+                         const gimi_send_options* options, int32_t timeout_ms) {
+  if (data == nullptr || (data->data == nullptr && data->size != 0))
+    return is_null("gimi_send_to(): data");
+  return with_core(node, [&](Core& core) {
+    return with_send_options(options, [&](const SendOptions& how) {
+      const auto stream = core.streams().stream(Peer{to}, how);
+      if (!stream) return fail(stream.failure());
+      return answer((*stream)->send(bytes_of(data), timeout_of(timeout_ms), More::no));
+    });
+  });
+}
+
+}  // extern "C"

@@ -1,0 +1,159 @@
+#include "client/gimi/api.hpp"
+
+// The C API: services that give data.
+
+using namespace gimnet;
+using namespace gimnet::gimi;
+
+extern "C" {
+
+gimi_status gimi_advertise(gimi_handle node, const char* name, const gimi_publish_options* options,
+                           gimi_handle* publisher) {
+  if (name == nullptr || publisher == nullptr)
+    return is_null("gimi_advertise(): name or publisher");
+  *publisher = 0;
+  return with<NodeObject>(node, [&](NodeObject& found) {
+    return with_options(options, "advertise", "gimi_publish_options", [&](const auto& given) {
+      PublishOptions how;
+      how.key = key_of(given.key);
+      if (!read_lane(given.lane, how.lane)) return bad_lane(given.lane);
+      if (given.delivery < GIMI_STREAM || given.delivery > GIMI_SYNC)
+        return fail(GIMI_BAD_ARGUMENT, "there is no delivery " + std::to_string(given.delivery));
+      how.delivery = static_cast<Delivery>(given.delivery);
+      if (given.window != 0) how.window = given.window;
+      how.retain = given.retain != 0;
+      how.timestamp = given.no_timestamp == 0;
+      how.metadata = text_of(given.metadata);
+      const auto service = found.core->services().advertise(found.core->state().name, name, how,
+                                                            timeout_in_options(given.timeout_ms));
+      if (!service) return fail(service.failure());
+      return give<PublisherObject>(publisher, found.core, **service);
+    });
+  });
+}
+
+gimi_status gimi_publish(gimi_handle publisher, const void* data, size_t size, int32_t timeout_ms,
+                         int32_t more) {
+  if (data == nullptr && size != 0) return is_null("gimi_publish(): data");
+  return with<PublisherObject>(publisher, [&](PublisherObject& found) {
+    return answer(found.service.publish(bytes_of(data, size), timeout_of(timeout_ms),
+                                        more != 0 ? More::yes : More::no));
+  });
+}
+
+gimi_status gimi_publish_many(gimi_handle publisher, const gimi_bytes* messages, size_t count,
+                              int32_t timeout_ms, size_t* published) {
+  if (published != nullptr) *published = 0;
+  if (messages == nullptr && count != 0) return is_null("gimi_publish_many(): messages");
+  return with<PublisherObject>(publisher, [&](PublisherObject& found) -> gimi_status {
+    for (std::size_t i = 0; i < count; ++i) {
+      const gimi_bytes& message = messages[i];
+      if (message.data == nullptr && message.size != 0) return is_null("data of a message");
+      const auto sent = found.service.publish(bytes_of(&message), timeout_of(timeout_ms),
+                                              i + 1 < count ? More::yes : More::no);
+      if (!sent) {
+        static_cast<void>(nif_flush(found.core->node()));
+        return fail(sent.failure());
+      }
+      if (published != nullptr) ++*published;
+    }
+    return GIMI_OK;
+  });
+}
+
+size_t gimi_subscribers(gimi_handle publisher) {
+  size_t count = 0;
+  static_cast<void>(with<PublisherObject>(publisher, [&](PublisherObject& found) -> gimi_status {
+    count = found.service.subscribers();
+    return GIMI_OK;
+  }));
+  return count;
+}
+
+gimi_status gimi_wait_for_subscribers(gimi_handle publisher, size_t count, int32_t timeout_ms) {
+  return with<PublisherObject>(publisher, [&](PublisherObject& found) {
+    return answer(found.service.wait_for_subscribers(count, timeout_of(timeout_ms)));
+  });
+}
+
+uint64_t gimi_published(gimi_handle publisher) {
+  uint64_t count = 0;
+  static_cast<void>(with<PublisherObject>(publisher, [&](PublisherObject& found) -> gimi_status {
+    count = found.service.published();
+    return GIMI_OK;
+  }));
+  return count;
+}
+
+gimi_status gimi_retained(gimi_handle publisher) {
+  return with<PublisherObject>(
+      publisher, [](PublisherObject& found) { return answer(found.service.retained()); });
+}
+
+gimi_status gimi_standing(gimi_handle handle) {
+  const ObjectRef ref = find_object(handle);
+  if (ref.object() != nullptr && ref.kind() == HandleKind::subscription) {
+    return guarded([&] {
+      return answer(static_cast<SubscriptionObject*>(ref.object())->service->standing());
+    });
+  }
+  return with<PublisherObject>(
+      handle, [](PublisherObject& found) { return answer(found.service.standing()); });
+}
+
+gimi_status gimi_service_name(gimi_handle handle, char* name, size_t size) {
+  if (name == nullptr || size == 0) return is_null("gimi_service_name(): name, or its size,");
+  *name = '\0';
+  const ObjectRef ref = find_object(handle);
+  if (ref.object() == nullptr) return no_object(ref);
+  return guarded([&]() -> gimi_status {
+    switch (ref.kind()) {
+      case HandleKind::publisher:
+        copy_text(static_cast<PublisherObject*>(ref.object())->service.full_name(), name, size);
+        return GIMI_OK;
+      case HandleKind::subscription:
+        copy_text(static_cast<SubscriptionObject*>(ref.object())->service->name(), name, size);
+        return GIMI_OK;
+      case HandleKind::sender:
+        copy_text(static_cast<SenderObject*>(ref.object())->stream->service(), name, size);
+        return GIMI_OK;
+      default:
+        return no_object(ref);
+    }
+  });
+}
+
+gimi_status gimi_subscribe(gimi_handle node, const char* full_name,
+                           const gimi_subscribe_options* options, gimi_handle* subscription) {
+  if (full_name == nullptr || subscription == nullptr)
+    return is_null("gimi_subscribe(): full_name or subscription");
+  *subscription = 0;
+  return with<NodeObject>(node, [&](NodeObject& found) {
+    return with_options(options, "subscribe", "gimi_subscribe_options", [&](const auto& given) {
+      const QueueOptions queue{given.messages, static_cast<AtFullQueue>(given.at_full)};
+      PaceOptions pace{given.window, given.depth == 0 ? 1 : given.depth, given.rate_hz};
+      auto service = found.core->services().subscribe(full_name, queue, pace,
+                                                      timeout_in_options(given.timeout_ms));
+      if (!service) return fail(service.failure());
+      return give<SubscriptionObject>(subscription, found.core, std::move(*service));
+    });
+  });
+}
+
+gimi_status gimi_provider(gimi_handle subscription, gimi_direction* provider) {
+  if (provider == nullptr) return is_null("gimi_provider(): provider");
+  *provider = GIMI_NOBODY;
+  return with<SubscriptionObject>(subscription, [&](SubscriptionObject& found) -> gimi_status {
+    if (found.service->exists()) *provider = GIMI_PROVIDES;
+    if (found.service->accepts()) *provider = GIMI_ACCEPTS;
+    return GIMI_OK;
+  });
+}
+
+gimi_status gimi_wait_until_exists(gimi_handle subscription, int32_t timeout_ms) {
+  return with<SubscriptionObject>(subscription, [&](SubscriptionObject& found) {
+    return answer(found.service->wait_until_exists(timeout_of(timeout_ms)));
+  });
+}
+
+}  // extern "C"
