@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <cstring>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "client/nif/hub_clock.hpp"
@@ -19,6 +20,7 @@
 #include "fuzz/support/fuzz_input.hpp"
 #include "fuzz/support/stranger_frames.hpp"
 #include "net/dial_handshake.hpp"
+#include "net/proxy_handshake.hpp"
 #include "proto/frame/frame_builder.hpp"
 
 namespace {
@@ -224,6 +226,26 @@ void check_handshake(std::span<const std::byte> bytes, std::size_t step) {
   FUZZ_MUST(!session.resumed || session.hub_epoch == 0x1234);
 }
 
+/// The same bytes as a proxy's answer to CONNECT.
+void check_proxy(std::span<const std::byte> bytes) {
+  using State = net::ProxyHandshake::State;
+  net::Address hub;
+  hub.host = "hub";
+  hub.port = 1;
+  net::ProxyHandshake handshake({"p", 1, "ann", "secret"}, hub);
+  std::size_t taken = 0;
+  while (handshake.state() == State::need_more && taken < bytes.size())
+    handshake.take(bytes[taken++]);
+  FUZZ_MUST(taken <= net::ProxyHandshake::kAnswerBytesMax + 1);
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), taken);
+  if (handshake.state() == State::open)
+    FUZZ_MUST(text.starts_with("HTTP/1.") && text[9] == '2' && text.ends_with('\n'));
+  if (handshake.state() != State::failed) return;
+  const std::string& words = handshake.error().sentence;
+  FUZZ_MUST(!words.empty() && words.size() < 400 && words.find("secret") == std::string::npos);
+  FUZZ_MUST(std::ranges::all_of(words, [](char letter) { return letter >= ' ' && letter <= '~'; }));
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -232,6 +254,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::size_t step = 1u + (data[0] >> 1);
   if ((data[0] & 1) != 0) {
     check_handshake(bytes, step);
+    check_proxy(bytes);
   } else {
     check_connection(bytes, step);
     check_strangers(bytes, step);

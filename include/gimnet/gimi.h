@@ -268,6 +268,7 @@ typedef struct gimi_link_options {
   const char* name; /**< NULL or "": the URL. */
   uint32_t cost;    /**< 0: measured; at most 65,535. */
   uint32_t reserved;
+  const char* proxy; /**< As in gimi_node_options; NULL or "": none. */
 } gimi_link_options;
 /** The hub dials one link more, until it ends. GIMI_BAD_ARGUMENT. */
 GIMNET_API gimi_status gimi_add_link(gimi_handle node, const gimi_link_options* link,

@@ -337,12 +337,15 @@ class Node {
         [&](gimi_list* list) { return gimi_reload_hub(handle_, milliseconds_of(timeout), list); });
   }
   /// The hub dials one link more, until it ends; an empty name is the URL, cost 0 is measured.
+  /// `proxy`: the URL of an HTTP proxy to dial through; the password in it goes to the hub alone.
   /// Errors: bad_argument (no URL, a name that is there, another machine without `insecure`).
   Outcome<void> add_link(std::string_view url, std::string_view name = {}, std::uint16_t cost = 0,
-                         Timeout timeout = Timeout{5000}) const {
+                         std::string_view proxy = {}, Timeout timeout = Timeout{5000}) const {
     const std::string url_text(url);
     const std::string name_text(name);
-    const gimi_link_options link{sizeof link, url_text.c_str(), name_text.c_str(), cost, 0};
+    const std::string proxy_text(proxy);
+    const gimi_link_options link{sizeof link, url_text.c_str(),  name_text.c_str(), cost,
+                                 0,           proxy_text.c_str()};
     return detail::outcome_of(gimi_add_link(handle_, &link, milliseconds_of(timeout)));
   }
   /// Ends a link that the hub dials. Errors: not_found.

@@ -32,7 +32,9 @@ typedef struct gimi_node_options {
    * this machine. */
   const char* hub;
   const char* description; /**< For people, at most 256 bytes. */
-  const char* proxy;       /**< Later versions dial through it; NULL. */
+  /** `http://host:port` or `http://user:password@host:port`: the HTTP proxy to reach `hub` through.
+   * NULL or "": the environment's GIMNET_PROXY, if it is set, for a hub that is named by tcp://. */
+  const char* proxy;
   const gimi_credentials* credentials;
   int32_t timeout_ms;     /**< For joining; 0: 5,000. */
   uint8_t wait_for_hub;   /**< Not 0: dial again until timeout_ms if there is no hub yet. */

@@ -171,6 +171,11 @@ typedef struct nif_options {
    * is started again, unless this is as large. At most 64 MiB, which all services of the handle
    * have together. Messages not kept are counted (nif_counters.last_messages_not_kept). */
   uint32_t last_message_bytes;
+  /** `http://host:port` or `http://user:password@host:port`: the HTTP proxy to dial the hub of `url`
+   * (or GIMNET_HUB) through, by CONNECT; %XX stands for a special character of user or password.
+   * NULL: the environment's GIMNET_PROXY, if it is set, for a hub that `url` or GIMNET_HUB names by
+   * `tcp://`; "": none. */
+  const char* proxy;
 } nif_options;
 
 /** Connects to a hub, registers the name, and stores the new handle in *node.

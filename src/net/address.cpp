@@ -70,6 +70,10 @@ Result<Address, NetError> parse_address(std::string_view url, std::uint16_t leas
   if (host.size() >= 2 && host.front() == '[' && host.back() == ']')
     host = host.substr(1, host.size() - 2);
   if (host.empty()) return not_understood(url, "the host is missing");
+  // A proxy is told it in a line of text.
+  const auto unprintable = [](unsigned char c) { return c <= ' ' || c == 0x7f; };
+  if (std::ranges::any_of(host, unprintable))
+    return not_understood(url, "the host has blanks or control characters");
   if (host.find_first_of("[]") != std::string_view::npos) {
     return not_understood(url, "an IPv6 address stands between [ and ]");
   }

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <functional>
 #include <optional>
 #include <string>
 #include <utility>
@@ -13,6 +14,7 @@
 #include "base/descriptor.hpp"
 #include "net/dial_handshake.hpp"
 #include "net/host_lookup.hpp"
+#include "net/proxy_handshake.hpp"
 
 namespace gimnet::net {
 namespace {
@@ -21,12 +23,20 @@ using StreamPointer = std::unique_ptr<Stream>;
 
 bool is_unix(const Address& address) { return address.scheme == Address::Scheme::unix_socket; }
 
-NetError cannot_connect(const Address& address, int error) {
+/// A place to connect to, and what there should be.
+struct Place {
+  const Address& address;
+  const char* what;
+};
+
+NetError cannot_connect(const Place& place, int error) {
+  const Address& address = place.address;
   Fault fault = Fault::no_peer;
   if (error == EMFILE || error == ENFILE || error == ENOMEM || error == ENOBUFS)
     fault = Fault::no_memory;
   if (error == EACCES || error == EPERM) fault = Fault::not_permitted;
-  std::string remedy = fault == Fault::no_peer ? "; is the hub running there?" : "";
+  std::string remedy =
+      fault == Fault::no_peer ? "; is the " + std::string(place.what) + " running there?" : "";
   if (error == EACCES && is_unix(address)) {
     remedy = "; it is another user's: connect as the user that runs the hub, or over TCP";
   }
@@ -52,35 +62,36 @@ NetError closed_early(const Address& address) {
 }
 
 /// Waits for a connect() under way.
-Result<StreamPointer, NetError> finish_dial(StreamPointer stream, const Address& address,
+Result<StreamPointer, NetError> finish_dial(StreamPointer stream, const Place& place,
                                             Deadline deadline, const WakeSignal& cancel) {
   for (;;) {
     const Readiness ready = wait_for(stream.get(), {.write = true}, cancel, deadline);
-    if (ready.woken) return cancelled(address);
+    if (ready.woken) return cancelled(place.address);
     if (ready.writable) break;
     if (steady_now_ns() >= deadline) {
       return NetError{Fault::timeout,
-                      "no connection to " + address.url() + " within the time given"};
+                      "no connection to " + place.address.url() + " within the time given"};
     }
   }
   int error = 0;
   socklen_t size = sizeof error;
   if (::getsockopt(stream->descriptor(), SOL_SOCKET, SO_ERROR, &error, &size) != 0) error = errno;
-  if (error != 0) return cannot_connect(address, error);
+  if (error != 0) return cannot_connect(place, error);
   return stream;
 }
 
-Result<StreamPointer, NetError> dial_one(const sockaddr* to, socklen_t size, const Address& address,
+Result<StreamPointer, NetError> dial_one(const sockaddr* to, socklen_t size, const Place& place,
                                          const SocketOptions& options, Deadline deadline,
                                          const WakeSignal& cancel) {
   const int descriptor = ::socket(to->sa_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  if (descriptor < 0) return cannot_connect(address, errno);
+  if (descriptor < 0) return cannot_connect(place, errno);
   StreamPointer stream = make_stream(
-      descriptor, is_unix(address) ? SocketStream::Family::unix_socket : SocketStream::Family::tcp,
+      descriptor,
+      is_unix(place.address) ? SocketStream::Family::unix_socket : SocketStream::Family::tcp,
       options);
   if (::connect(descriptor, to, size) == 0) return stream;
-  if (errno != EINPROGRESS && errno != EINTR) return cannot_connect(address, errno);
-  return finish_dial(std::move(stream), address, deadline, cancel);
+  if (errno != EINPROGRESS && errno != EINTR) return cannot_connect(place, errno);
+  return finish_dial(std::move(stream), place, deadline, cancel);
 }
 
 /// Nothing: all is written.
@@ -110,69 +121,131 @@ NetError refused(const proto::Goodbye& goodbye, const Address& address) {
   return error;
 }
 
-/// Reads until the handshake is over, one way or the other.
-std::optional<NetError> await_answer(Stream& stream, DialHandshake& handshake,
-                                     const Address& address, Deadline deadline,
-                                     const WakeSignal& cancel) {
+/// Takes what came, and gives the bytes that are still missing at least; 0: that is all.
+using Take = std::function<std::size_t(std::span<const std::byte>)>;
+
+/// The errors for a peer that ends, and for one that does not answer in time.
+struct Silences {
+  NetError closed;
+  NetError late;
+};
+
+/// Reads `missing` bytes at most, and then as many as `take` says, until it has all.
+std::optional<NetError> read_answer(Stream& stream, std::size_t missing, const Take& take,
+                                    const Address& address, const Silences& silences,
+                                    Deadline deadline, const WakeSignal& cancel) {
   std::array<std::byte, 4096> memory;
-  for (;;) {
-    const std::size_t most = std::min(memory.size(), handshake.missing());
+  while (missing != 0) {
+    const std::size_t most = std::min(memory.size(), missing);
     const IoResult result = stream.receive(std::span(memory).first(most));
     if (result.status == IoStatus::closed || result.status == IoStatus::failed)
-      return closed_early(address);
-    if (result.status == IoStatus::would_block) {
-      const Interest interest = interest_of(true, false, stream.pending_out());
-      const Readiness ready = wait_for(&stream, interest, cancel, deadline);
-      if (ready.woken) return cancelled(address);
-      if (ready.writable && stream.send({}).status == IoStatus::failed)
-        return closed_early(address);
-      if (!ready.readable && steady_now_ns() >= deadline) {
-        return NetError{Fault::timeout,
-                        "the peer at " + address.url() + " does not answer HELLO; is it a hub?"};
-      }
+      return silences.closed;
+    if (result.status == IoStatus::ok) {
+      missing = take(std::span(memory).first(result.bytes));
       continue;
     }
-    switch (handshake.take(std::span(memory).first(result.bytes))) {
-      case DialHandshake::State::need_more:
-        break;
-      case DialHandshake::State::welcome:
-        return std::nullopt;
-      case DialHandshake::State::goodbye:
-        return refused(handshake.goodbye(), address);
-      case DialHandshake::State::failed:
-        return NetError{handshake.error().fault, address.url() + ": " + handshake.error().sentence};
-    }
+    const Interest interest = interest_of(true, false, stream.pending_out());
+    const Readiness ready = wait_for(&stream, interest, cancel, deadline);
+    if (ready.woken) return cancelled(address);
+    if (ready.writable && stream.send({}).status == IoStatus::failed) return silences.closed;
+    if (!ready.readable && steady_now_ns() >= deadline) return silences.late;
   }
+  return std::nullopt;
 }
 
-}  // namespace
+/// The hub's answer to HELLO. Nothing: it is WELCOME.
+std::optional<NetError> await_welcome(Stream& stream, DialHandshake& handshake,
+                                      const Address& address, Deadline deadline,
+                                      const WakeSignal& cancel) {
+  auto state = DialHandshake::State::need_more;
+  const Take take = [&](std::span<const std::byte> bytes) {
+    state = handshake.take(bytes);
+    return state == DialHandshake::State::need_more ? handshake.missing() : 0;
+  };
+  const Silences silences{
+      closed_early(address),
+      {Fault::timeout, "the peer at " + address.url() + " does not answer HELLO; is it a hub?"}};
+  if (auto error =
+          read_answer(stream, handshake.missing(), take, address, silences, deadline, cancel))
+    return error;
+  if (state == DialHandshake::State::goodbye) return refused(handshake.goodbye(), address);
+  if (state == DialHandshake::State::failed)
+    return NetError{handshake.error().fault, address.url() + ": " + handshake.error().sentence};
+  return std::nullopt;
+}
 
-Result<StreamPointer, NetError> dial(const Address& address, const SocketOptions& options,
-                                     Deadline deadline, const WakeSignal& cancel) {
-  const auto found = find_addresses(address, deadline, cancel);
+Result<StreamPointer, NetError> dial_place(const Place& place, const SocketOptions& options,
+                                           Deadline deadline, const WakeSignal& cancel) {
+  const auto found = find_addresses(place.address, deadline, cancel);
   if (!found) return found.error();
   std::optional<NetError> last;
   for (const HostAddress& each : *found) {
     auto dialed = dial_one(reinterpret_cast<const sockaddr*>(each.data()),
-                           static_cast<socklen_t>(each.size()), address, options, deadline, cancel);
+                           static_cast<socklen_t>(each.size()), place, options, deadline, cancel);
     if (dialed || dialed.error().fault == Fault::cancelled) return dialed;
     last = dialed.error();
   }
   return *last;  // find_addresses() gave one at least
 }
 
-Result<Welcomed, NetError> dial_hub(const Address& address, const SocketOptions& options,
+/// A stream to `to` that the proxy relays.
+Result<StreamPointer, NetError> dial_through(const ProxyAddress& proxy, const Address& to,
+                                             const SocketOptions& options, Deadline deadline,
+                                             const WakeSignal& cancel) {
+  Address door;
+  door.host = proxy.host;
+  door.port = proxy.port;
+  const auto of_proxy = [&](NetError error) {
+    error.nobody_listens = false;  // what is known of the hub is nothing
+    if (error.fault != Fault::cancelled)
+      error.sentence = "through the proxy " + proxy.shown() + ": " + error.sentence;
+    return error;
+  };
+  auto dialed = dial_place({door, "proxy"}, options, deadline, cancel);
+  if (!dialed) return of_proxy(dialed.error());
+  ProxyHandshake handshake(proxy, to);
+  const std::string request = handshake.request();
+  // One that refuses may close before it has read everything.
+  const auto unwritten =
+      write_all(**dialed, std::as_bytes(std::span(request)), door, deadline, cancel);
+  if (unwritten && unwritten->fault != Fault::no_peer) return of_proxy(*unwritten);
+  const Take take = [&](std::span<const std::byte> bytes) {
+    return std::size_t{handshake.take(bytes[0]) == ProxyHandshake::State::need_more ? 1u : 0u};
+  };
+  const Silences silences{
+      {Fault::no_peer, "it closed the connection without an answer; is it an HTTP proxy?"},
+      {Fault::timeout, "it does not answer CONNECT; is it an HTTP proxy?"}};
+  // Byte by byte: what follows the answer is the hub's.
+  if (auto error = read_answer(**dialed, 1, take, door, silences, deadline, cancel))
+    return of_proxy(*error);
+  if (handshake.state() == ProxyHandshake::State::failed) return of_proxy(handshake.error());
+  return dialed;
+}
+
+}  // namespace
+
+Result<StreamPointer, NetError> dial(const Address& address, const SocketOptions& options,
+                                     Deadline deadline, const WakeSignal& cancel) {
+  return dial_place({address, "hub"}, options, deadline, cancel);
+}
+
+Result<Welcomed, NetError> dial_hub(const Address& address, const DialOptions& options,
                                     const proto::Hello& hello, Deadline deadline,
                                     const WakeSignal& cancel) {
-  auto dialed = dial(address, options, deadline, cancel);
+  const bool proxied = options.proxy && !is_unix(address);
+  auto dialed = proxied ? dial_through(*options.proxy, address, options.socket, deadline, cancel)
+                        : dial(address, options.socket, deadline, cancel);
   if (!dialed) return dialed.error();
   Stream& stream = **dialed;
   // A hub that refuses may close before it has read everything: its words are still there to read.
   const auto unwritten = write_all(stream, encode_hello(hello), address, deadline, cancel);
   if (unwritten && unwritten->fault != Fault::no_peer) return *unwritten;
   DialHandshake handshake;
-  if (auto error = await_answer(stream, handshake, address, deadline, cancel))
+  if (auto error = await_welcome(stream, handshake, address, deadline, cancel)) {
+    if (proxied && error->fault != Fault::refused && error->fault != Fault::cancelled)
+      error->sentence += " (through the proxy " + options.proxy->shown() + ")";
     return std::move(*error);
+  }
   const auto rest = handshake.rest();
   return Welcomed{std::move(*dialed), handshake.welcome(), {rest.begin(), rest.end()}};
 }

@@ -3,10 +3,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "base/result.hpp"
 #include "net/address.hpp"
+#include "net/proxy_address.hpp"
 #include "net/socket_stream.hpp"
 #include "net/wait.hpp"
 #include "proto/control/link.hpp"
@@ -27,10 +29,17 @@ struct Welcomed {
   std::vector<std::byte> rest;  ///< bytes of the hub that came behind WELCOME
 };
 
-/// Dials and shakes hands. Errors: those of dial(), Fault::protocol, Fault::bad_version, and
-/// Fault::refused with the hub's GOODBYE.
+/// The terms of dialling a hub. A value type.
+struct DialOptions {
+  SocketOptions socket{};
+  std::optional<ProxyAddress> proxy{};  ///< for TCP; nothing: straight
+};
+
+/// Dials, through the proxy where there is one, and shakes hands. Errors: those of dial(),
+/// Fault::protocol, Fault::bad_version, and Fault::refused with the hub's GOODBYE. A proxy that
+/// refuses is Fault::no_peer.
 [[nodiscard]] Result<Welcomed, NetError> dial_hub(const Address& address,
-                                                  const SocketOptions& options,
+                                                  const DialOptions& options,
                                                   const proto::Hello& hello, Deadline deadline,
                                                   const WakeSignal& cancel);
 

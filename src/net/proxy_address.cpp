@@ -37,6 +37,22 @@ std::optional<std::string> decoded(std::string_view text) {
 
 }  // namespace
 
+std::string ProxyAddress::shown() const {
+  const std::string login = password.empty() ? user : user + ":***";
+  return std::string(kHttp) + login + (login.empty() ? "" : "@") + place();
+}
+
+std::string ProxyAddress::place() const {
+  const bool numeric_v6 = host.find(':') != std::string::npos;
+  return (numeric_v6 ? "[" + host + "]" : host) + ":" + std::to_string(port);
+}
+
+Result<ProxyAddress> proxy_towards(const Address& hub, std::string_view url) {
+  if (hub.scheme == Address::Scheme::tcp) return parse_proxy(url);
+  return Error{"no proxy reaches " + hub.url() +
+               ", a socket of this machine: leave the proxy out, or give a tcp:// URL"};
+}
+
 Result<ProxyAddress> parse_proxy(std::string_view url) {
   if (std::ranges::any_of(url, is_control))
     return refuse("...", "there are control characters in its URL");

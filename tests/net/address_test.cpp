@@ -61,5 +61,14 @@ TEST(Address, SuggestsTheSchemeThatIsMissing) {
             std::string::npos);
 }
 
+TEST(Address, AHostIsOnePrintableWord) {
+  for (const char* url : {"tcp://a b:1", "tcp://a\r\nX-Evil: 1:1", "tcp://a\x7f:1"}) {
+    const auto address = parse_address(url);
+    ASSERT_FALSE(address) << url;
+    EXPECT_NE(address.error().sentence.find("the host has blanks or control characters"),
+              std::string::npos);
+  }
+}
+
 }  // namespace
 }  // namespace gimnet::net

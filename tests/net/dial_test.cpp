@@ -123,6 +123,81 @@ TEST(DialHub, TellsAPeerThatIsNoHubFromOneThatLeaves) {
   EXPECT_EQ(dial_hub_that_says({}).error().fault, Fault::no_peer);
 }
 
+/// Dials a hub through a proxy that answers CONNECT so and then is the hub, which answers HELLO
+/// so. `asked`: the bytes of CONNECT.
+Result<Welcomed, NetError> dial_through(const std::string& tunnel, std::vector<std::byte> answer,
+                                        std::string& asked) {
+  const Door door;
+  const WakeSignal cancel;
+  std::thread proxy([&] {
+    const Descriptor far(door.accept());
+    char byte = 0;
+    while (!asked.ends_with("\r\n\r\n") && ::recv(far.get(), &byte, 1, 0) == 1) asked += byte;
+    EXPECT_EQ(::send(far.get(), tunnel.data(), tunnel.size(), MSG_NOSIGNAL),
+              static_cast<ssize_t>(tunnel.size()));
+    std::array<std::byte, 1024> hello;
+    if (answer.empty() || ::recv(far.get(), hello.data(), hello.size(), 0) <= 0) return;
+    EXPECT_EQ(hello[0], proto::kOpening[0]);
+    EXPECT_EQ(::send(far.get(), answer.data(), answer.size(), MSG_NOSIGNAL),
+              static_cast<ssize_t>(answer.size()));
+  });
+  DialOptions options;
+  options.proxy = ProxyAddress{door.address().host, door.address().port, "ann", "secret"};
+  auto welcomed =
+      dial_hub(*parse_address("tcp://hub.lab:9"), options, proto::Hello{}, patience(), cancel);
+  proxy.join();
+  return welcomed;
+}
+
+TEST(DialHub, ShakesHandsThroughAProxy) {
+  proto::Welcome welcome;
+  welcome.node = NodeId{17};
+  std::string asked;
+  const auto welcomed =
+      dial_through("HTTP/1.1 200 OK\r\nVia: p\r\n\r\n", opening_and(welcome), asked);
+  ASSERT_TRUE(welcomed) << welcomed.error().sentence;
+  EXPECT_EQ(welcomed->welcome, welcome);
+  EXPECT_TRUE(asked.starts_with("CONNECT hub.lab:9 HTTP/1.1\r\n"));
+}
+
+TEST(DialHub, TellsWhatAProxyDidAndNeverItsPassword) {
+  std::string asked;
+  const std::vector<std::pair<std::string, std::string>> answers{
+      {"", "it closed the connection without an answer"},
+      {"HTTP/1.1 403 No\r\n\r\n", "it answers '403 No'"},
+      {"HTTP/1.1 200 OK\r\n\r\n", "before it said WELCOME; is it a hub? (through the proxy "}};
+  for (const auto& [answer, words] : answers) {
+    asked.clear();
+    const auto refused = dial_through(answer, {}, asked);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().fault, Fault::no_peer);
+    EXPECT_FALSE(refused.error().nobody_listens);
+    EXPECT_NE(refused.error().sentence.find(words), std::string::npos) << refused.error().sentence;
+    EXPECT_NE(refused.error().sentence.find("through the proxy http://ann:***@127.0.0.1:"),
+              std::string::npos)
+        << refused.error().sentence;
+    EXPECT_EQ(refused.error().sentence.find("secret"), std::string::npos);
+  }
+}
+
+TEST(DialHub, LeavesAProxyThatIsNotThereOrNeverAnswers) {
+  const WakeSignal cancel;
+  DialOptions options;
+  {
+    const Door door;
+    options.proxy = ProxyAddress{door.address().host, door.address().port, "", ""};
+    const auto late = dial_hub(*parse_address("tcp://hub.lab:9"), options, proto::Hello{},
+                               steady_now_ns() + 20 * kNsPerMs, cancel);
+    EXPECT_EQ(late.error().fault, Fault::timeout);
+    EXPECT_TRUE(late.error().sentence.ends_with("does not answer CONNECT; is it an HTTP proxy?"));
+  }
+  const auto gone =
+      dial_hub(*parse_address("tcp://hub.lab:9"), options, proto::Hello{}, patience(), cancel);
+  EXPECT_EQ(gone.error().fault, Fault::no_peer);
+  EXPECT_FALSE(gone.error().nobody_listens) << "nothing is known of the hub";
+  EXPECT_TRUE(gone.error().sentence.ends_with("; is the proxy running there?"));
+}
+
 TEST(DialHub, LeavesAtTheDeadlineOrWhenItIsCancelled) {
   const Door door;  // its backlog takes the connection, and nobody answers
   WakeSignal cancel;

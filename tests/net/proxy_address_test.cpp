@@ -40,7 +40,17 @@ TEST(ProxyAddress, SaysWhatIsWrong) {
     EXPECT_THAT(fault(std::string("http://") + login + "@p:1"), HasSubstr("user or password"));
 }
 
+TEST(ProxyAddress, LeadsToNoUnixSocket) {
+  EXPECT_EQ(proxy_towards(*parse_address("tcp://h:1"), "http://p:1")->port, 1);
+  EXPECT_FALSE(proxy_towards(*parse_address("tcp://h:1"), "p:1"));
+  EXPECT_THAT(proxy_towards(*parse_address("unix:/s"), "http://p:1").error().sentence,
+              HasSubstr("no proxy reaches unix:/s"));
+}
+
 TEST(ProxyAddress, NeverShowsAPassword) {
+  for (const char* url : {"http://p:1", "http://ann@p:1", "http://[::1]:80"})
+    EXPECT_EQ(parse_proxy(url)->shown(), url);
+  EXPECT_EQ(parse_proxy("http://ann:secret@p:1")->shown(), "http://ann:***@p:1");
   EXPECT_EQ(shown_proxy("http://p:1"), "http://p:1");
   EXPECT_EQ(shown_proxy("http://ann@p:1"), "http://ann@p:1");
   EXPECT_EQ(shown_proxy("http://ann:secret@p:1"), "http://ann:***@p:1");

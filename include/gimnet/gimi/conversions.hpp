@@ -45,6 +45,7 @@ using SharedHandle = std::shared_ptr<const Handle>;
   how.name = options.name.c_str();
   how.hub = options.hub.c_str();
   how.description = options.description.c_str();
+  how.proxy = options.proxy.c_str();
   how.timeout_ms = milliseconds_in_options(options.timeout);
   how.wait_for_hub = options.wait_for_hub ? 1 : 0;
   how.no_reconnect = options.reconnect ? 0 : 1;

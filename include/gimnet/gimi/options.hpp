@@ -65,6 +65,9 @@ struct NodeOptions {
   /// (`retained_message_bytes`). 1..64 MiB, which all services have together.
   /// NodeState::last_messages_not_kept counts what was not.
   std::uint32_t last_message_bytes = std::uint32_t{16} << 20;
+  /// `http://host:port` or `http://user:password@host:port`: the HTTP proxy to reach `hub` through.
+  /// "": the environment's GIMNET_PROXY, if it is set, for a hub that is named by tcp://.
+  std::string proxy{};
 };
 
 /// The behaviour of a full queue when a message comes.

@@ -78,6 +78,7 @@ nif_status Core::connect(const NodeOptions& options) {
   how.message_bytes_max = nif_bytes_max(options.message_bytes_max);
   how.socket_receive_bytes = options.socket_receive_bytes;
   how.last_message_bytes = options.last_message_bytes;
+  how.proxy = options.proxy.empty() ? nullptr : options.proxy.c_str();
   how.callback = &Core::on_incoming;
   how.user = this;
   how.credit_by_program = 1;

@@ -169,7 +169,8 @@ gimi_status gimi_add_link(gimi_handle node, const gimi_link_options* link, int32
           if (given.cost > UINT16_MAX)
             return fail(GIMI_BAD_ARGUMENT, "cannot add the link: its cost is more than 65,535");
           const proto::ctrl::LinkAdd wanted{text_of(given.url), text_of(given.name),
-                                            static_cast<std::uint16_t>(given.cost)};
+                                            static_cast<std::uint16_t>(given.cost),
+                                            text_of(given.proxy)};
           return answer(add_link(core.node(), wanted, timeout_of(timeout_ms)));
         });
   });

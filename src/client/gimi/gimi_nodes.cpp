@@ -12,12 +12,11 @@ Outcome<NodeOptions> read(const gimi_node_options& given) {
     return Failure{Status::bad_argument,
                    "cannot join: this version of the library knows no credentials"};
   }
-  if (given.proxy != nullptr)
-    return Failure{Status::bad_argument, "cannot join: this version of the library knows no proxy"};
   NodeOptions options;
   options.name = text_of(given.name);
   options.hub = text_of(given.hub);
   options.description = text_of(given.description);
+  options.proxy = text_of(given.proxy);
   options.timeout = timeout_in_options(given.timeout_ms);
   options.wait_for_hub = given.wait_for_hub != 0;
   options.reconnect = given.no_reconnect == 0;

@@ -5,7 +5,7 @@
 namespace gimnet::nif {
 namespace {
 
-Result<Admitted, Failure> admit_at(const net::Address& address, const net::SocketOptions& options,
+Result<Admitted, Failure> admit_at(const net::Address& address, const net::DialOptions& options,
                                    proto::Hello hello, Deadline deadline,
                                    const net::WakeSignal& cancel, const TokenFor& token_for) {
   if (hello.token.empty() && token_for) hello.token = token_for(address.url());
@@ -22,7 +22,7 @@ Result<Admitted, Failure> admit_at(const net::Address& address, const net::Socke
 }  // namespace
 
 Result<Admitted, Failure> admit(std::span<const net::Address> addresses,
-                                const net::SocketOptions& options, const proto::Hello& hello,
+                                const net::DialOptions& options, const proto::Hello& hello,
                                 Deadline deadline, const net::WakeSignal& cancel,
                                 const TokenFor& token_for) {
   Failure last{NIF_NO_HUB, "no address to connect to"};

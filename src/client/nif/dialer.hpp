@@ -30,7 +30,7 @@ using TokenFor = std::function<std::vector<std::byte>(const std::string& address
 /// fail, the last hub-less failure is told. `token_for` is asked where `hello` has no token; it may
 /// be empty. Errors: those of net::dial_hub(); NIF_CLOSED when `cancel` was raised.
 [[nodiscard]] Result<Admitted, Failure> admit(std::span<const net::Address> addresses,
-                                              const net::SocketOptions& options,
+                                              const net::DialOptions& options,
                                               const proto::Hello& hello, Deadline deadline,
                                               const net::WakeSignal& cancel,
                                               const TokenFor& token_for = {});

@@ -33,4 +33,26 @@ Result<std::vector<net::Address>, Failure> hub_addresses(std::string_view url) {
   return addresses;
 }
 
+Result<std::optional<net::ProxyAddress>, Failure> proxy_to_hub(const char* proxy,
+                                                               std::string_view url) {
+  const bool asked_for = proxy != nullptr;
+  const std::string chosen = asked_for ? proxy : environment("GIMNET_PROXY");
+  if (chosen.empty()) return std::optional<net::ProxyAddress>{};
+  const std::string hub = url.empty() ? environment("GIMNET_HUB") : std::string(url);
+  if (!asked_for && !hub.starts_with("tcp:")) return std::optional<net::ProxyAddress>{};
+  if (hub.empty()) {
+    return Failure{NIF_BAD_ARGUMENT,
+                   "cannot use a proxy without the URL of the hub behind it: give tcp://host:port, "
+                   "too"};
+  }
+  const auto address = net::parse_address(hub);
+  if (!address) return failure_of(address.error());
+  auto parsed = net::proxy_towards(*address, chosen);
+  if (!parsed) {
+    return Failure{NIF_BAD_ARGUMENT,
+                   parsed.error().sentence + (asked_for ? "" : " (that is GIMNET_PROXY)")};
+  }
+  return std::optional(std::move(*parsed));
+}
+
 }  // namespace gimnet::nif

@@ -77,8 +77,8 @@ Result<std::unique_ptr<Node>, Failure> Node::connect(Options options) {
     return node->tokens_.find(address);
   };
   for (;;) {
-    auto admitted = admit(node->options_.addresses, node->options_.socket, node->hello(), deadline,
-                          node->stop_, token_for);
+    auto admitted = admit(node->options_.addresses, node->options_.dialling, node->hello(),
+                          deadline, node->stop_, token_for);
     if (admitted) {
       if (!node->take_over(std::move(*admitted), true)) {
         return Failure{NIF_PROTOCOL, "the hub resumes a connection that never was"};

@@ -230,7 +230,7 @@ void Node::redial() {
   take_new_name();
   Deadline deadline = steady_now_ns() + kRedialNs;
   if (resumes_only_) deadline = std::min(deadline, broke_ns_ + session_.grace_ns);
-  auto admitted = admit(options_.addresses, options_.socket, hello(), deadline, stop_);
+  auto admitted = admit(options_.addresses, options_.dialling, hello(), deadline, stop_);
   if (!admitted) {
     if (admitted.error().status == NIF_CLOSED) return;
     set_last_error(admitted.error().sentence);

@@ -53,8 +53,8 @@ std::optional<Failure> read_limits(const nif_options& given, Options& options) {
   if (given.socket_receive_bytes > INT32_MAX || given.socket_send_bytes > INT32_MAX) {
     return bad("a socket buffer is over 2 GiB");
   }
-  options.socket.receive_bytes = given.socket_receive_bytes;
-  if (given.socket_send_bytes != 0) options.socket.send_bytes = given.socket_send_bytes;
+  options.dialling.socket.receive_bytes = given.socket_receive_bytes;
+  if (given.socket_send_bytes != 0) options.dialling.socket.send_bytes = given.socket_send_bytes;
   return std::nullopt;
 }
 
@@ -83,6 +83,9 @@ Result<Options, Failure> read_options(const nif_options* options) {
   auto addresses = hub_addresses(given.url != nullptr ? given.url : "");
   if (!addresses) return addresses.error();
   checked.addresses = std::move(*addresses);
+  auto proxy = proxy_to_hub(given.proxy, given.url != nullptr ? given.url : "");
+  if (!proxy) return proxy.error();
+  checked.dialling.proxy = std::move(*proxy);
   return checked;
 }
 

@@ -12,7 +12,7 @@
 #include "client/nif/send_queue.hpp"
 #include "gimnet/nif.h"
 #include "net/address.hpp"
-#include "net/socket_stream.hpp"
+#include "net/dial.hpp"
 #include "proto/frame/reassembler.hpp"
 
 namespace gimnet::nif {
@@ -35,7 +35,7 @@ struct Options {
   std::size_t receive_queue_bytes = 16 * 1024 * 1024;
   proto::ReassemblyLimits reassembly{.message_bytes_max = 64u << 20,
                                      .waiting_bytes_max = 64u << 20};
-  net::SocketOptions socket{.receive_bytes = 0, .send_bytes = 256 * 1024};
+  net::DialOptions dialling{.socket = {.receive_bytes = 0, .send_bytes = 256 * 1024}};
   nif_callback callback = nullptr;
   void* user = nullptr;
   bool credit_by_program = false;

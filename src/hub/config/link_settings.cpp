@@ -137,9 +137,7 @@ void add_link(Configuration& configuration, const LinkTable& table, const std::s
   link->terms = table.link.terms;
   const bool tcp = link->address.scheme == net::Address::Scheme::tcp;
   if (!tcp && !table.link.proxy.empty()) {
-    faults.push_back({place, "link '" + link->name +
-                                 "' leads to a Unix socket, which no proxy reaches: leave proxy "
-                                 "out, or give a tcp:// URL"});
+    faults.push_back({place, net::proxy_towards(link->address, table.link.proxy).error().sentence});
     return;
   }
   link->proxy = table.proxy_given || !tcp ? table.link.proxy : configuration.proxy;

@@ -35,19 +35,19 @@ LinkDialler::~LinkDialler() {
 
 void LinkDialler::dial(LinkNumber link, const DialledLink& to, const proto::Hello& hello,
                        const net::SocketOptions& options) {
+  net::DialOptions how{options, std::nullopt};
   if (!to.proxy.empty()) {
+    const Result<net::ProxyAddress> proxy = net::parse_proxy(to.proxy);
     // Never past a proxy that somebody asked for.
-    return end(link, net::NetError(net::Fault::bad_address,
-                                   "this version cannot dial through a proxy: remove `proxy` and "
-                                   "GIMNET_PROXY, and use a tunnel (docs/operations.md, 'Crossing "
-                                   "a network')"));
+    if (!proxy) return end(link, net::NetError(net::Fault::bad_address, proxy.error().sentence));
+    how.proxy = *proxy;
   }
   Attempt& attempt = attempts_.emplace_back();
   attempt.link = link;
   try {
     const SignalsBlocked blocked;
-    attempt.thread = std::thread([this, &attempt, address = to.address, hello, options] {
-      note(attempt, net::dial_hub(address, options, hello, steady_now_ns() + kAttemptNs, cancel_));
+    attempt.thread = std::thread([this, &attempt, address = to.address, hello, how] {
+      note(attempt, net::dial_hub(address, how, hello, steady_now_ns() + kAttemptNs, cancel_));
     });
   } catch (const std::system_error& error) {
     attempts_.pop_back();

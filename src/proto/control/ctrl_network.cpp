@@ -180,10 +180,12 @@ void LinkAdd::write(bitestream::Writer& writer) const {
   put_clean_text(writer, 3, url, kWrittenNameBytesMax);
   if (!name.empty()) put_clean_text(writer, 4, name, kWrittenNameBytesMax);
   if (cost != 0) writer.put_u16(5, cost);
+  if (!proxy.empty()) put_clean_text(writer, 6, proxy, kWrittenNameBytesMax);
 }
 LinkAdd LinkAdd::read(Fields& fields) {
   return {fields.required_text(3, "URL", kWrittenNameBytesMax),
-          fields.text(4, "name", kWrittenNameBytesMax), fields.number<std::uint16_t>(5, "cost", 0)};
+          fields.text(4, "name", kWrittenNameBytesMax), fields.number<std::uint16_t>(5, "cost", 0),
+          fields.text(6, "proxy", kWrittenNameBytesMax)};
 }
 
 void LinkRemove::write(bitestream::Writer& writer) const {

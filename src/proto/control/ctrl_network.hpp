@@ -133,6 +133,7 @@ struct LinkAdd {
   std::string url;
   std::string name;        ///< "": the URL
   std::uint16_t cost = 0;  ///< 0: measured
+  std::string proxy{};     ///< the URL of an HTTP proxy, maybe with a password; "": none
   void write(bitestream::Writer& writer) const;
   [[nodiscard]] static LinkAdd read(Fields& fields);
   friend bool operator==(const LinkAdd&, const LinkAdd&) = default;

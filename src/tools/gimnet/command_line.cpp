@@ -34,7 +34,7 @@ Called called_by(std::span<const char* const> arguments) {
   Called called;
   for (std::size_t i = 0; i < arguments.size(); ++i) {
     const std::string_view word = arguments[i];
-    if (word == "--hub" || word == "--shard" || word == "--color") {
+    if (word == "--hub" || word == "--proxy" || word == "--shard" || word == "--color") {
       ++i;
     } else if (word.starts_with('-')) {
       continue;

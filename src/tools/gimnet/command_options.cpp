@@ -266,6 +266,10 @@ void add_commands(CLI::App& app, ToolOptions& options) {
   app.add_option("--hub", options.hub,
                  "tcp://host:port or unix:/path, default GIMNET_HUB, else this machine's hub")
       ->check(not_empty());
+  app.add_option("--proxy", options.proxy,
+                 "http://[user:password@]host:port to reach a tcp:// hub through, default "
+                 "GIMNET_PROXY")
+      ->check(not_empty());
   app.add_flag("--json", options.json,
                "print JSON: one document, or an object a line where there is no end");
   app.add_option("--color", options.colour,

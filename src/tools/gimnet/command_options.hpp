@@ -51,7 +51,8 @@ Data goes to standard output, words to standard error. Ends with 0 done, 1 faile
 
 /// The end of each command's help.
 inline constexpr const char* kEverywhere =
-    "With every command: --hub URL, --json, --color WORD; `gimnet --help` explains them.";
+    "With every command: --hub URL, --proxy URL, --json, --color WORD; `gimnet --help` explains "
+    "them.";
 
 inline constexpr const char* kSendAbout =
     R"(Send messages to a node, or to a service that accepts data, and wait until all are acknowledged.

@@ -91,6 +91,9 @@ void add_link(CLI::App& link, CtlOptions& options) {
       ->check(CLI::Range(0, 65'535).description(""));
   link.add_option("--name", options.name, "of add: what people call it, default the URL")
       ->check(not_empty());
+  link.add_option("--proxy", options.proxy,
+                  "of add: http://[user:password@]host:port, which the hub is to dial through")
+      ->check(not_empty());
   link.add_option("--cost", options.cost, "of add: 1 to 65535, default what is measured")
       ->check(CLI::Range(1, 65'535).description(""));
 }
@@ -133,8 +136,11 @@ std::string link_fault(const CtlOptions& options) {
     return "cost is missing: 1 to 65535, or 0 for what is measured";
   if (options.change == "remove" && options.cost)
     return "a link that is removed has no cost: leave it out";
-  if (options.change != "add" && !options.name.empty())
-    return "--name is for a link that is added: leave it out";
+  for (const auto& [word, given] :
+       {std::pair("--name", options.name), {"--proxy", options.proxy}}) {
+    if (options.change != "add" && !given.empty())
+      return std::string(word) + " is for a link that is added: leave it out";
+  }
   return {};
 }
 
@@ -252,7 +258,7 @@ ExitCode link(ToolSession& session) {
   const CtlOptions& ctl = session.options().ctl;
   const std::uint16_t cost = ctl.cost.value_or(0);
   const Outcome<void> outcome =
-      ctl.change == "add"      ? session.node().add_link(ctl.link, ctl.name, cost)
+      ctl.change == "add"      ? session.node().add_link(ctl.link, ctl.name, cost, ctl.proxy)
       : ctl.change == "remove" ? session.node().remove_link(ctl.link)
                                : session.node().set_link_cost(ctl.link, cost);
   const std::string words = ctl.change == "add"      ? "dialling " + ctl.link

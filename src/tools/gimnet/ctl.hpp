@@ -28,6 +28,7 @@ struct CtlOptions {
   std::string change;                   ///< link: add, remove or cost
   std::string link;                     ///< link: the URL to add, or a name
   std::string name;                     ///< link add
+  std::string proxy;                    ///< link add
   std::optional<std::uint16_t> cost{};  ///< link add and link cost; 0: measured
 };
 

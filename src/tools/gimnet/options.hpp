@@ -44,7 +44,8 @@ enum class Colour : std::uint8_t { automatic, always, never };
 /// The command line. Thread safety: immutable once read.
 struct ToolOptions {
   Command command = Command::status;
-  std::string hub;  ///< "": the environment's GIMNET_HUB, else the hub of this machine
+  std::string hub;    ///< "": the environment's GIMNET_HUB, else the hub of this machine
+  std::string proxy;  ///< "": the environment's GIMNET_PROXY
   bool json = false;
   Colour colour = Colour::automatic;
   std::optional<std::uint8_t> shard;

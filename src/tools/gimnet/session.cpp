@@ -60,6 +60,7 @@ void say(const std::string& sentence) {
 
 NodeOptions ToolSession::options_for(NodeOptions how) const {
   how.hub = options_.hub;
+  how.proxy = options_.proxy;
   how.shard = options_.shard;
   if (how.description.empty()) how.description = kToolDescription;
   return how;
@@ -81,7 +82,9 @@ std::optional<ExitCode> ToolSession::join_to_look(NodeOptions how) {
 std::optional<ExitCode> ToolSession::settle(Outcome<Node> joined) {
   if (!joined) {
     Failure failure = joined.failure();
-    if (failure.status == Status::no_hub || failure.status == Status::no_host) {
+    // Of a hub behind a proxy the sentence says all.
+    const bool straight = options_.proxy.empty() && std::getenv("GIMNET_PROXY") == nullptr;
+    if (straight && (failure.status == Status::no_hub || failure.status == Status::no_host)) {
       if (!failure.sentence.ends_with('.') && !failure.sentence.ends_with('?'))
         failure.sentence += '.';
       failure.sentence += advice(

@@ -12,6 +12,8 @@
 namespace gimnet::nif::test {
 namespace {
 
+constexpr auto npos = std::string::npos;
+
 TEST(HubAddresses, PrefersTheUrlThenTheEnvironmentThenTheDefaults) {
   const Environment hub("GIMNET_HUB", "tcp://h:1");
   EXPECT_EQ((*hub_addresses("tcp://given:2"))[0].url(), "tcp://given:2");
@@ -27,6 +29,38 @@ TEST(HubAddresses, PrefersTheUrlThenTheEnvironmentThenTheDefaults) {
   const auto refused = hub_addresses("");
   ASSERT_FALSE(refused);
   EXPECT_NE(refused.error().sentence.find("GIMNET_HUB"), std::string::npos);
+}
+
+TEST(ProxyToHub, IsTheOneAskedForOrThatOfTheEnvironmentForANamedHub) {
+  const Environment hub("GIMNET_HUB", "");
+  const Environment proxy("GIMNET_PROXY", "http://env:1");
+  EXPECT_EQ((*proxy_to_hub(nullptr, "tcp://h:1"))->host, "env");
+  EXPECT_EQ((*proxy_to_hub("http://ann:secret@given:2", "tcp://h:1"))->host, "given");
+  EXPECT_FALSE(*proxy_to_hub("", "tcp://h:1")) << "none is asked for";
+  EXPECT_FALSE(*proxy_to_hub(nullptr, "unix:/a"));
+  EXPECT_FALSE(*proxy_to_hub(nullptr, "")) << "the hub of this machine";
+  const Environment named("GIMNET_HUB", "tcp://h:1");
+  EXPECT_EQ((*proxy_to_hub(nullptr, ""))->host, "env");
+  const Environment none("GIMNET_PROXY", "");
+  EXPECT_FALSE(*proxy_to_hub(nullptr, "tcp://h:1"));
+}
+
+TEST(ProxyToHub, SaysWhatIsWrong) {
+  const Environment hub("GIMNET_HUB", "");
+  const auto fault = [](const char* proxy, const char* url) {
+    const auto refused = proxy_to_hub(proxy, url);
+    EXPECT_FALSE(refused);
+    if (refused) return std::string();
+    EXPECT_EQ(refused.error().status, NIF_BAD_ARGUMENT);
+    return refused.error().sentence;
+  };
+  EXPECT_NE(fault("http://p:1", "unix:/a").find("no proxy reaches unix:/a"), npos);
+  EXPECT_NE(fault("http://p:1", "").find("give tcp://host:port, too"), npos);
+  EXPECT_NE(fault("p:1", "tcp://h:1").find("write http://HOST:PORT"), npos);
+  const Environment proxy("GIMNET_PROXY", "http://ann:secret@p");
+  const std::string words = fault(nullptr, "tcp://h:1");
+  EXPECT_NE(words.find("(that is GIMNET_PROXY)"), npos);
+  EXPECT_EQ(words.find("secret"), npos);
 }
 
 // As a hub does: else it would look where none is.

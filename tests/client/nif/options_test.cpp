@@ -42,6 +42,15 @@ TEST(Options, ResumeIsOnForNamedNodesUnlessSaidOtherwise) {
   EXPECT_EQ(read_options(&options).error().status, NIF_BAD_ARGUMENT);
 }
 
+TEST(Options, TakesAProxy) {
+  nif_options options = given();
+  options.proxy = "http://p:3128";
+  ASSERT_TRUE(read_options(&options));
+  EXPECT_EQ(read_options(&options)->dialling.proxy->port, 3128);
+  options.proxy = "p:3128";
+  EXPECT_EQ(read_options(&options).error().status, NIF_BAD_ARGUMENT);
+}
+
 TEST(Options, AnOlderProgramGivesAShorterStruct) {
   nif_options options = given();
   options.description = "not there yet";

@@ -41,12 +41,22 @@ TEST(LinkDialler, TellsWhyNobodyAnswers) {
 TEST(LinkDialler, DialsNobodyPastAProxy) {
   LinkDialler dialler;
   DialledLink link = to_nobody();
-  link.proxy = "http://proxy:3128";
+  link.address = *net::parse_address("tcp://127.0.0.1:1");
+  link.proxy = "proxy:3128";
   dialler.dial(LinkNumber{4}, link, {}, {});
   auto ended = wait(dialler);
   ASSERT_EQ(ended.size(), 1u);
   ASSERT_FALSE(ended[0].second);
-  EXPECT_NE(ended[0].second.error().sentence.find("proxy"), std::string::npos);
+  EXPECT_NE(ended[0].second.error().sentence.find("cannot use the proxy 'proxy:3128'"),
+            std::string::npos);
+  // Nobody listens at port 1, neither a proxy nor a hub.
+  link.proxy = "http://127.0.0.1:1";
+  dialler.dial(LinkNumber{5}, link, {}, {});
+  ended = wait(dialler);
+  ASSERT_EQ(ended.size(), 1u);
+  ASSERT_FALSE(ended[0].second);
+  EXPECT_TRUE(ended[0].second.error().sentence.starts_with("through the proxy http://127.0.0.1:1"))
+      << ended[0].second.error().sentence;
 }
 
 TEST(LinkDialler, EndsWithAttemptsUnderWay) {

@@ -62,7 +62,7 @@ TEST(CtrlNetworkMessages, AreDecodedAndWrittenAsTheVectorsSay) {
   expect_answer("ctrl/hubs_answer", 9, HubsAnswer{{some_hub(), far}, true});
   expect_request("ctrl/links", 10, Links{1});
   expect_answer("ctrl/links_answer", 10, LinksAnswer{{some_link()}, false});
-  expect_request("ctrl/link_add", 11, LinkAdd{"tcp://10.0.0.9:7450", "far", 50});
+  expect_request("ctrl/link_add", 11, LinkAdd{"tcp://10.0.0.9:7450", "far", 50, "http://p:1"});
   expect_answer("ctrl/link_add_answer", 11, LinkChanged<LinkAdd>{});
   expect_request("ctrl/link_remove", 12, LinkRemove{"far"});
   expect_answer("ctrl/link_remove_answer", 12, LinkChanged<LinkRemove>{});
@@ -77,6 +77,7 @@ TEST(CtrlNetworkMessages, OmitWhatIsTheDefault) {
   ASSERT_TRUE(added);
   EXPECT_EQ(added->name, "");
   EXPECT_EQ(added->cost, 0);
+  EXPECT_EQ(added->proxy, "");
 }
 
 TEST(CtrlNetworkMessages, AHubMayComeWithItsIdAlone) {

@@ -25,6 +25,7 @@ class Process:
     def __init__(self, arguments, stdin=subprocess.DEVNULL, env=None, stdout=subprocess.PIPE):
         environment = dict(os.environ)
         environment.pop("GIMNET_HUB", None)
+        environment.pop("GIMNET_PROXY", None)
         environment.pop("STATE_DIRECTORY", None)
         environment.update({"XDG_RUNTIME_DIR": HOME.name, "XDG_STATE_HOME": HOME.name}, **(env or {}))
         self.popen = subprocess.Popen(arguments, stdin=stdin, stdout=stdout, stderr=subprocess.PIPE, env=environment)
@@ -97,19 +98,24 @@ class Hub:
     """A tcphub of its own, on a free port and a Unix socket in a folder of its own. Ends with the test, at whose end it has
     to have an exact ledger, if it lives then."""
 
-    def __init__(self, test, *arguments, shards=1, hub_id=7, listen=None, state=None):
-        self._how = {"shards": shards, "hub_id": hub_id}
+    def __init__(self, test, *arguments, shards=1, hub_id=7, listen=None, state=None, netns=None, env=None):
+        """`hub_id`: None for the default. `listen`: URLs, or what gives them for the URL of its Unix socket. `netns`: a network namespace to run in."""
+        self._how = {"shards": shards, "hub_id": hub_id, "netns": netns, "env": env}
         self._arguments = arguments
         self._folder = tempfile.TemporaryDirectory(prefix="gimnet-test-")
         test.addCleanup(self._folder.cleanup)
         self.socket_path = os.path.join(self._folder.name, "hub.sock")
         self.state = state or os.path.join(self._folder.name, "state")
         listen = listen or ["tcp://127.0.0.1:0", f"unix:{self.socket_path}"]
-        words = [TCPHUB, "--shards", str(shards), "--hub-id", str(hub_id), "--placement", "hint",
-                 "--state-dir", self.state]
+        if callable(listen):
+            listen = listen(f"unix:{self.socket_path}")
+        words = ["ip", "netns", "exec", netns] if netns else []
+        words += [TCPHUB, "--shards", str(shards), "--placement", "hint", "--state-dir", self.state]
+        if hub_id:
+            words += ["--hub-id", str(hub_id)]
         for address in listen:
             words += ["--listen", address]
-        self.process = Process(words + list(arguments))
+        self.process = Process(words + list(arguments), env=env)
         test.addCleanup(self.process.end)
         line = wait_until(lambda: self._ready_line(), f"ready line of tcphub; it said: {self.process.err}")
         self.addresses = line.split()[1:]
@@ -210,10 +216,10 @@ def start_gimnet(test, hub, *arguments, **pipes):
     return process
 
 
-def run_gimnet(hub, *arguments, data=b"", patience_s=2 * PATIENCE_S):
+def run_gimnet(hub, *arguments, data=b"", patience_s=2 * PATIENCE_S, env=None):
     """gimnet from start to end. Its `code`, `out` and `err`."""
     process = Process([GIMNET, "--hub", hub.url if hasattr(hub, "url") else hub, *arguments],
-                      stdin=subprocess.PIPE).feed(data)
+                      stdin=subprocess.PIPE, env=env).feed(data)
     try:
         process.code = process.wait(patience_s)
     finally:

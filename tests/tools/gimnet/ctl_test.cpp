@@ -48,6 +48,7 @@ TEST(CtlOptions, ChangesOfLinksAreUnderstood) {
   EXPECT_EQ(add.link, "tcp://h:1");
   EXPECT_EQ(add.name, "lab");
   EXPECT_EQ(add.cost, 20);
+  EXPECT_EQ(ctl({"ctl", "link", "add", "tcp://h:1", "--proxy", "http://p:1"}).proxy, "http://p:1");
   EXPECT_FALSE(ctl({"ctl", "link", "add", "unix:/a"}).cost);
   EXPECT_EQ(ctl({"ctl", "link", "remove", "lab"}).link, "lab");
   EXPECT_EQ(ctl({"ctl", "link", "cost", "lab", "65535"}).cost, 65'535);
@@ -63,6 +64,8 @@ TEST(CtlOptions, WrongChangesOfLinksAreTold) {
     EXPECT_EQ(ending->code, ExitCode::usage);
     return ending->text;
   };
+  EXPECT_THAT(fault({"ctl", "link", "remove", "lab", "--proxy", "http://p:1"}),
+              HasSubstr("--proxy is for a link that is added: leave it out"));
   EXPECT_THAT(fault({"ctl", "link"}), HasSubstr("change is missing: add, remove or cost"));
   EXPECT_THAT(fault({"ctl", "link", "ad", "x"}),
               HasSubstr("'ad' is no value for change: add, remove or cost"));

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <tuple>
 
+#include "net/proxy_address.hpp"
 #include "proto/control/ctrl_network.hpp"
 
 namespace gimnet::hub {
@@ -128,6 +129,11 @@ Changed<ctrl::LinkAdd> add(HandlerContext& context, const ctrl::LinkAdd& wanted)
         not_encrypted(link->address, "insecure = true in the configuration and start it again")};
   }
   link->cost = wanted.cost;
+  if (!wanted.proxy.empty()) {
+    const Result<net::ProxyAddress> proxy = net::proxy_towards(link->address, wanted.proxy);
+    if (!proxy) return Refusal{Status::bad_request, proxy.error().sentence};
+  }
+  link->proxy = wanted.proxy;
   return changed<ctrl::LinkAdd>(Status::bad_request, context.network->add_link(*link));
 }
 

@@ -171,7 +171,9 @@ TEST_F(NetworkHandlerTest, LinksAreToldByTheirNamesInPages) {
 TEST_F(NetworkHandlerTest, AddsALink) {
   ASSERT_TRUE(add({"tcp://127.0.0.1:7451", "lab", 20}));
   ASSERT_TRUE(add({"unix:/run/hub"}));
-  ASSERT_THAT(network_.added, SizeIs(2));
+  ASSERT_TRUE(add({"tcp://127.0.0.1:7451", "far", 0, "http://ann:secret@p:1"}));
+  ASSERT_THAT(network_.added, SizeIs(3));
+  EXPECT_EQ(network_.added[2].proxy, "http://ann:secret@p:1");
   EXPECT_EQ(network_.added[0].address.url(), "tcp://127.0.0.1:7451");
   EXPECT_EQ(network_.added[0].name, "lab");
   EXPECT_EQ(network_.added[0].cost, 20);
@@ -183,6 +185,10 @@ TEST_F(NetworkHandlerTest, AddsNoLinkThatIsWrong) {
   EXPECT_THAT(add({"lab:7451"}).error().sentence, HasSubstr("did you mean tcp://lab:7451?"));
   EXPECT_THAT(add({"unix:/a", "a b"}).error().sentence, HasSubstr("'a b'"));
   EXPECT_THAT(add({"tcp://lab:7451"}).error().sentence, HasSubstr("insecure = true"));
+  EXPECT_THAT(add({"unix:/a", "", 0, "http://p:1"}).error().sentence,
+              HasSubstr("no proxy reaches unix:/a"));
+  EXPECT_THAT(add({"tcp://127.0.0.1:1", "", 0, "http://a:secret@p"}).error().sentence,
+              HasSubstr("a:***@p"));
   EXPECT_THAT(network_.added, SizeIs(0));
   facts_.insecure = true;
   EXPECT_TRUE(add({"tcp://lab:7451"}));
