@@ -356,6 +356,12 @@ ExitCode run_routes(ToolSession& session) {
   if (!peer) return session.code();
   const auto way = way_to(session, hub_of(NodeId{peer->id}).value());
   if (!way) return session.fail(way.failure());
+  // An id is not looked up: only its hub knows whether a node has it.
+  if (Peer::parse(session.options().target)) {
+    const auto there = session.node().ping(*peer, Timeout{500});
+    if (there.is(Status::not_delivered))
+      return session.fail({Status::not_found, there.failure().sentence});
+  }
   session.output().write(session.options().json ? json_of(*way) : text_of(*way));
   return session.finish();
 }

@@ -60,6 +60,9 @@ void write(JsonWriter& json, const RoundTrips::Summary& us) {
 
 std::string shown(double us) { return std::isfinite(us) ? decimal(us, 1) : "-"; }
 
+/// A hub reads its clock once a turn: what comes and goes in one has no measured delay.
+std::string shown_delay(double us) { return us == 0.0 ? "<turn" : shown(us); }
+
 /// Offsets between neighbours on the way, as far as the hubs can be asked.
 ClockOffsets clocks_along(ToolSession& session, const std::vector<std::uint32_t>& hubs) {
   ClockOffsets clocks;
@@ -98,9 +101,9 @@ std::string json_of(const std::vector<HopReport>& hops, const RoundTrips& trips,
 std::string text_of(const std::vector<HopReport>& hops) {
   Table table({"HUB", "DELAY p50 us", "p99", "LINK p50 us", "p99", "CLOCK us", "ERROR us"});
   for (const HopReport& hop : hops) {
-    table.add({std::to_string(hop.hub_id), shown(hop.delay_us.p50), shown(hop.delay_us.p99),
-               shown(hop.link_us.p50), shown(hop.link_us.p99), shown(hop.clock_offset_us),
-               shown(hop.clock_error_us)});
+    table.add({std::to_string(hop.hub_id), shown_delay(hop.delay_us.p50),
+               shown_delay(hop.delay_us.p99), shown(hop.link_us.p50), shown(hop.link_us.p99),
+               shown(hop.clock_offset_us), shown(hop.clock_error_us)});
   }
   return table.text();
 }

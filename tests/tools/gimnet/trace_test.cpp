@@ -73,6 +73,9 @@ TEST(TraceText, HasTheHops) {
             "\"p50\":null,\"p99\":null},\"clock_offset_us\":0.000,\"clock_error_us\":0.000}],"
             "\"round_trip_us\":{\"p50\":5.000,\"p99\":5.000},\"sent\":2,\"lost\":1}\n");
   EXPECT_THAT(text_of(tally.hops({})), HasSubstr("HUB  DELAY p50 us"));
+  TraceTally quick;
+  quick.add({5'000, {{7, 100'000, 100'000}}});
+  EXPECT_THAT(text_of(quick.hops({})), HasSubstr("7    <turn"));
 }
 
 }  // namespace
