@@ -341,11 +341,9 @@ class Node {
   /// Errors: bad_argument (no URL, a name that is there, another machine without `insecure`).
   Outcome<void> add_link(std::string_view url, std::string_view name = {}, std::uint16_t cost = 0,
                          std::string_view proxy = {}, Timeout timeout = Timeout{5000}) const {
-    const std::string url_text(url);
-    const std::string name_text(name);
-    const std::string proxy_text(proxy);
-    const gimi_link_options link{sizeof link, url_text.c_str(),  name_text.c_str(), cost,
-                                 0,           proxy_text.c_str()};
+    const std::string texts[] = {std::string(url), std::string(name), std::string(proxy)};
+    const gimi_link_options link{sizeof link, texts[0].c_str(), texts[1].c_str(), cost,
+                                 0,           texts[2].c_str()};
     return detail::outcome_of(gimi_add_link(handle_, &link, milliseconds_of(timeout)));
   }
   /// Ends a link that the hub dials. Errors: not_found.
