@@ -25,6 +25,8 @@ typedef uint32_t gimi_peer;
 #define GIMI_NAME_BYTES_MAX 255
 /** Longest sentence of this library in bytes, without the terminating NUL. */
 #define GIMI_SENTENCE_BYTES_MAX 1024
+/** The longest sentence of gimi_error_text(): a hub may tell many faults of its configuration. */
+#define GIMI_ERROR_BYTES_MAX 8192
 
 /** The pointer to options of that type for a call, filled as told; what is not told is zero, the
  * default: gimi_join(GIMI_OPTIONS(gimi_node_options, .name = "robot"), &node). */
@@ -166,7 +168,7 @@ GIMNET_API const char* gimi_status_text(gimi_status status);
 GIMNET_API const char* gimi_change_text(gimi_change change);
 
 /** The sentence (what happened, to what, what to do) of the last call of this thread that failed:
- * UTF-8, at most GIMI_SENTENCE_BYTES_MAX bytes, never NULL. Calls that succeed, release and
+ * UTF-8, at most GIMI_ERROR_BYTES_MAX bytes, never NULL. Calls that succeed, release and
  * gimi_close() leave it alone. Valid until: the next gimi_* call of this thread that fails. */
 GIMNET_API const char* gimi_error_text(void);
 

@@ -89,7 +89,7 @@ class Sixteen(Network):
         # Each half goes on over the other way round.
         self.hubs[5].popen.kill()
         self.hubs.pop(5).popen.wait()
-        wait_until(lambda: self.seen_from(urls[1]).get(9, {}).get("via") == 16, "the way round hub 5")
+        wait_until(lambda: self.seen_from(urls[1]).get(6, {}).get("via") == 16, "the way round hub 5")
         self.carry(urls[1], urls[6])
 
     def test_a_star(self):

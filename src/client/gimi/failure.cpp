@@ -10,7 +10,7 @@ namespace gimnet::gimi {
 namespace {
 
 // Not NIF's sentence: calls of NIF inside one that succeeds may change that.
-thread_local constinit std::array<char, GIMI_SENTENCE_BYTES_MAX + 1> t_sentence{};
+thread_local constinit std::array<char, GIMI_ERROR_BYTES_MAX + 1> t_sentence{};
 
 constexpr std::array<const char*, 22> kStatusTexts{
     "done",         "timeout",       "closed",      "bad argument",   "no hub",
@@ -26,7 +26,7 @@ constexpr std::array<const char*, 11> kChangeTexts{
 }  // namespace
 
 gimi_status fail(gimi_status status, std::string_view sentence) {
-  const std::string_view kept = nif::cut_text(sentence, GIMI_SENTENCE_BYTES_MAX);
+  const std::string_view kept = nif::cut_text(sentence, GIMI_ERROR_BYTES_MAX);
   std::memmove(t_sentence.data(), kept.data(), kept.size());
   t_sentence[kept.size()] = '\0';
   return status;

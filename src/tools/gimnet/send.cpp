@@ -120,6 +120,8 @@ Failure reason(const ToolSession& session, const Peer& peer, const SendCounts& c
     }
     return failure;
   }
+  if (counts.loss_reason == LossReason::connection_lost)
+    return {Status::not_connected, failure.sentence};
   return {Status::not_delivered,
           std::to_string(counts.lost) + " of " + std::to_string(counts.sent) +
               " messages were not acknowledged by " + target + ": " + loss_words(counts, target) +

@@ -67,8 +67,8 @@ TEST(Failure, ItsSentenceBelongsToTheThread) {
 }
 
 TEST(Failure, ALongSentenceIsCut) {
-  static_cast<void>(gimi::fail(GIMI_LIMIT, std::string(GIMI_SENTENCE_BYTES_MAX + 1, 'x')));
-  EXPECT_EQ(std::string_view(gimi_error_text()).size(), std::size_t{GIMI_SENTENCE_BYTES_MAX});
+  static_cast<void>(gimi::fail(GIMI_LIMIT, std::string(GIMI_ERROR_BYTES_MAX + 1, 'x')));
+  EXPECT_EQ(std::string_view(gimi_error_text()).size(), std::size_t{GIMI_ERROR_BYTES_MAX});
 }
 
 }  // namespace
