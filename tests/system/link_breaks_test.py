@@ -1,0 +1,129 @@
+#!/usr/bin/env python3
+"""A link breaks again and again while a node sends over it: the hub in the middle of three is killed, the network cuts or
+stalls the connection, a hub stands still. Each frame arrives once or is reported to its sender."""
+
+import json
+import os
+import shutil
+import signal
+import struct
+import subprocess
+import threading
+import unittest
+
+from support.processes import GIMNET, Hub, Process, run_gimnet
+from support.waiting import wait_until
+from support.wire import FLAG_REPORT, REPORT, Client, Closed
+
+FULL = os.environ.get("GIMNET_STRESS") == "full"
+PATIENT = ("--limit", "silent_ms=600000")  # the nodes here send no signs of life
+LINK_UNSURE = 22
+
+
+class Reader(threading.Thread):
+    """Reads all that comes to a node: numbered frames, and what is reported."""
+
+    def __init__(self, client):
+        super().__init__(daemon=True)
+        self.client, self.numbers, self.reported = client, [], {}
+
+    def run(self):
+        try:
+            while True:
+                got = self.client.next()
+                if got.kind == REPORT:
+                    reason, count = struct.unpack_from("<B3xI", got.payload)
+                    self.reported[reason] = self.reported.get(reason, 0) + count
+                elif got.kind < REPORT:
+                    self.numbers.append(struct.unpack("<I", got.payload)[0])
+        except (Closed, OSError):
+            pass
+
+
+class Sender(threading.Thread):
+    """Sends numbered frames, some hundred a second, until it is stopped."""
+
+    def __init__(self, client, to):
+        super().__init__(daemon=True)
+        self.client, self.to, self.sent, self._stopped = client, to, 0, threading.Event()
+
+    def run(self):
+        while not self._stopped.wait(0.003):
+            self.client.send(self.client.frame(self.to, struct.pack("<I", self.sent), flags=FLAG_REPORT))
+            self.sent += 1
+
+    def stop(self):
+        self._stopped.set()
+        self.join()
+
+
+class Breaks(unittest.TestCase):
+    def begin(self, source, target):
+        """A stream of frames from a node at one hub to one at another."""
+        self.receiver, self.sender = Reader(Client(self, target).join("B")), Reader(Client(self, source).join("A"))
+        self.stream = Sender(self.sender.client, self.receiver.client.id)
+        for thread in (self.receiver, self.sender, self.stream):
+            thread.start()
+        self.until_more()
+
+    def until_more(self):
+        begin = len(self.receiver.numbers)
+        wait_until(lambda: len(self.receiver.numbers) > begin + 20, "frames that arrive")
+
+    def expect_all_told(self):
+        self.stream.stop()
+        sent, numbers, reported = self.stream.sent, self.receiver.numbers, self.sender.reported
+        wait_until(lambda: sent - len(numbers) <= sum(reported.values()),
+                   f"the fate of {sent} frames: {len(numbers)} came, {reported} reported")
+        self.assertEqual(numbers, sorted(set(numbers)), "each once, in order")
+        # Those reported `link_unsure` may have arrived, no others.
+        self.assertLessEqual(sum(reported.values()), sent - len(numbers) + reported.get(LINK_UNSURE, 0), reported)
+
+    def test_the_hub_in_the_middle_is_killed(self):
+        first = Hub(self, "--accept-links", *PATIENT, hub_id=1)
+        middle = Hub(self, "--accept-links", "--link", first.url, hub_id=2)
+        last = Hub(self, "--link", middle.url, *PATIENT, hub_id=3)
+        self.begin(last, first)
+        for death in range(20 if FULL else 5):
+            middle.process.signal(signal.SIGKILL)
+            middle.process.wait()
+            if death % 2:  # as another hub
+                shutil.rmtree(middle.state)
+            middle = middle.again(self)
+            self.until_more()
+        self.expect_all_told()
+        self.assertTrue(self.sender.reported, "no death cost anything: this test sees nothing")
+
+    def test_the_network_cuts_and_stalls_and_a_hub_stands_still(self):
+        first = Hub(self, "--accept-links", *PATIENT, hub_id=1)
+        network = Process([GIMNET, "impair", "tcp://127.0.0.1:0", first.url], stdin=subprocess.PIPE)
+        self.addCleanup(network.end)
+        wait_until(lambda: network.out.startswith(b"ready "), f"the network; it said: {network.err}")
+        last = Hub(self, "--link", network.out.decode().split()[1], *PATIENT, hub_id=3)
+
+        def order(line):
+            network.popen.stdin.write(line.encode() + b"\n")
+            network.popen.stdin.flush()
+        self.begin(last, first)
+        for _ in range(5 if FULL else 1):
+            order("cut")
+            self.until_more()
+            order("stall 1500ms")  # longer than a link may be silent
+            self.until_silent(last)
+            self.until_more()
+            first.process.signal(signal.SIGSTOP)
+            self.until_silent(last)
+            first.process.signal(signal.SIGCONT)
+            self.until_more()
+        self.expect_all_told()
+
+    def until_silent(self, hub):
+        """The link of the hub has no connection any more."""
+        def silent():
+            links = json.loads(run_gimnet(hub, "links", "--json").out or "[]")
+            return links and links[0]["state"] in ("dialling", "away")
+        wait_until(silent, "the end of a silent link")
+
+
+if __name__ == "__main__":
+    unittest.main()
