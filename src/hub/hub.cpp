@@ -139,8 +139,9 @@ struct Ground {
   std::vector<const SessionGauges*> readable_sessions;
 };
 
-/// As configured, with the hub id that it drew where none is.
-HubOptions identified(HubOptions options, const HubState& state) {
+/// As configured, with the links to dial now, and the hub id that it drew where none is.
+HubOptions identified(HubOptions options, std::vector<DialledLink> dial, const HubState& state) {
+  options.links.dial = std::move(dial);
   if (!options.id_configured && state.drawn_hub != kOwnHub) options.id = state.drawn_hub;
   return options;
 }
@@ -165,9 +166,10 @@ HubFacts facts_of(const HubOptions& options, const StartState& from) {
 /// In the order in which they need each other: shards end before the conductor frees what they look
 /// at.
 struct Hub::Parts {
-  Parts(const HubOptions& given, const ConfigSources& sources, StartState from,
-        std::vector<std::unique_ptr<Listener>> listeners)
-      : options(identified(given, from.start.state)),
+  /// `given`: as configured. `dial`: the links to dial.
+  Parts(const HubOptions& given, std::vector<DialledLink> dial, const ConfigSources& sources,
+        StartState from, std::vector<std::unique_ptr<Listener>> listeners)
+      : options(identified(given, std::move(dial), from.start.state)),
         reloader(sources, given),
         limits(given.limits),
         state_folder(std::move(from.folder)),
@@ -187,6 +189,7 @@ struct Hub::Parts {
                                     network()}) {
     for (const auto& listener : listeners) {
       addresses += (addresses.empty() ? "" : " ") + listener->url().text();
+      listen.push_back(listener->url());
     }
     loop = std::make_unique<ConductorLoop>(
         ConductorLoop::Wiring{conductor, ground.inbox, limits, ground.refusals, dialler},
@@ -216,6 +219,7 @@ struct Hub::Parts {
   LinkDialler dialler;
   Conductor conductor;
   std::string addresses;
+  std::vector<ListenUrl> listen;
   std::unique_ptr<ConductorLoop> loop;
 };
 
@@ -223,8 +227,10 @@ Hub::Hub(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
 
 Hub::~Hub() { parts_->shards.stop(); }
 
-Result<std::unique_ptr<Hub>> Hub::start(const HubOptions& options, const ConfigSources& sources) {
-  const std::vector<ListenUrl> urls = addresses_for(options);
+Result<std::unique_ptr<Hub>> Hub::start(const HubOptions& options, const ConfigSources& sources,
+                                        const std::optional<Succession>& former) {
+  const std::vector<ListenUrl> asked_for = addresses_for(options);
+  const std::vector<ListenUrl>& urls = former ? former->listen : asked_for;
   std::vector<std::unique_ptr<Listener>> listeners;
   for (const ListenUrl& url : urls) {
     Result<std::unique_ptr<Listener>> listener = Listener::open(url, listeners);
@@ -242,20 +248,32 @@ Result<std::unique_ptr<Hub>> Hub::start(const HubOptions& options, const ConfigS
   Result<StartState> state =
       start_state({.folder = options.state_dir,
                    .draws_hub = !options.id_configured && !options.links.dial.empty(),
-                   .address = urls.front(),
+                   .drawn = former ? former->id : kOwnHub,
+                   .address = asked_for.front(),
                    .wall = wall});
   if (!state) return state.error();
   std::unique_ptr<Hub> hub(
-      new Hub(std::make_unique<Parts>(options, sources, std::move(*state), std::move(listeners))));
+      new Hub(std::make_unique<Parts>(options, former ? former->links : options.links.dial, sources,
+                                      std::move(*state), std::move(listeners))));
   hub->parts_->shards.start();
   return hub;
 }
 
 std::string Hub::addresses() const { return parts_->addresses; }
 
-void Hub::run() {
+std::optional<Hub::Succession> Hub::run() {
   parts_->loop->run();
   parts_->shards.stop();
+  const std::optional<HubId> redrawn = parts_->conductor.redrawn();
+  if (!redrawn) return std::nullopt;
+  log_info("hub id " + std::to_string(parts_->options.id.value()) +
+           " is another hub's: this hub begins anew as hub " + std::to_string(redrawn->value()) +
+           "; hub_id = N sets one");
+  Succession successor{*redrawn, parts_->listen, {}};
+  for (const auto& [number, link] : parts_->conductor.links()->all()) {
+    if (link->is_dialled()) successor.links.push_back(link->dialled());
+  }
+  return successor;
 }
 
 }  // namespace gimnet::hub

@@ -3,6 +3,7 @@
 
 #include <cstdio>
 #include <exception>
+#include <optional>
 #include <string>
 #include <variant>
 
@@ -34,23 +35,29 @@ int show(const hub::CommandLineEnding& ending) {
   return 1;
 }
 
+/// Nodes do not wait for somebody who reads this.
+void tell_ready(const hub::Hub& hub) {
+  const std::string ready = "ready " + hub.addresses() + "\n";
+  if (const std::string why = write_standard_output(ready, WhenFull::fail); !why.empty())
+    log_warning("the ready line cannot be written to standard output: " + why);
+}
+
 int run(const hub::CommandLine& line) {
   const hub::HubOptions& options = line.configuration.options;
   set_log_level(options.log_level);
   set_log_rates({options.limits.log_lines_per_s, options.limits.peer_log_lines_per_s});
   for (const std::string& warning : line.warnings) log_warning(warning);
   raise_descriptor_limit();
-  const auto hub = hub::Hub::start(options, line.sources);
-  if (!hub) {
-    std::fprintf(stderr, "tcphub: %s\n", hub.error().sentence.c_str());
-    return 1;
-  }
-  // Nodes do not wait for somebody who reads this.
-  const std::string ready = "ready " + (*hub)->addresses() + "\n";
-  if (const std::string why = write_standard_output(ready, WhenFull::fail); !why.empty()) {
-    log_warning("the ready line cannot be written to standard output: " + why);
-  }
-  (*hub)->run();
+  std::optional<hub::Hub::Succession> former;
+  do {
+    const auto hub = hub::Hub::start(options, line.sources, former);
+    if (!hub) {
+      std::fprintf(stderr, "tcphub: %s\n", hub.error().sentence.c_str());
+      return 1;
+    }
+    if (!former) tell_ready(**hub);
+    former = (*hub)->run();
+  } while (former);
   return 0;
 }
 

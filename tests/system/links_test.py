@@ -112,6 +112,20 @@ class Refused(unittest.TestCase):
         second = Hub(self, "--link", first.url, hub_id=1)
         self.error_of(second, "hub id 1", "--hub-id")
 
+    def test_two_stand_alone_hubs_with_the_default_id_are_linked(self):
+        hubs = [Hub(self, "--accept-links", hub_id=None) for _ in range(2)]
+        receivers = [start_recv(self, hub, name) for hub, name in zip(hubs, ("north", "south"))]
+        added = run_gimnet(f"unix:{hubs[0].socket_path}", "ctl", "link", "add", hubs[1].url)
+        self.assertEqual(added.code, 0, added.err)
+        # One of them begins anew under another id, at its addresses and with its link; its node comes back by itself.
+        for hub, name in zip(hubs, ("south", "north")):
+            wait_until(lambda hub=hub, name=name: run_gimnet(hub, "send", name, data=b"hello\n").code == 0,
+                       f"{name} at the other hub")
+        for receiver in receivers:
+            wait_until(lambda receiver=receiver: receiver.out.endswith(b"hello\n"), "its message")
+        ids = {hub["id"] for hub in json.loads(run_gimnet(hubs[0], "hubs", "--json").out)}
+        self.assertTrue(len(ids) == 2 and max(ids) >= 1024, ids)
+
     def test_a_hub_that_dials_itself(self):
         with socket.create_server(("127.0.0.1", 0)) as place:
             port = place.getsockname()[1]

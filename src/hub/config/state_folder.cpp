@@ -241,17 +241,18 @@ HubState new_state(bool known_first) {
   return state;
 }
 
-void draw_if_needed(HubState& state, bool needed) {
-  if (!needed || state.drawn_hub != kOwnHub) return;
+void draw_if_needed(HubState& state, const StateWish& wish) {
+  if (wish.drawn != kOwnHub) state.drawn_hub = wish.drawn;
+  if (!wish.draws_hub || state.drawn_hub != kOwnHub) return;
   state.drawn_hub = draw_hub(random_bits(), [](HubId) { return false; });
   log_info("the hub drew hub id " + std::to_string(state.drawn_hub.value()) +
            ", since it links to others and none is configured; hub_id = N sets one");
 }
 
-StartState in_memory(bool known_first, bool draws_hub) {
+StartState in_memory(bool known_first, const StateWish& wish) {
   StartState result;
   result.start.state = new_state(known_first);
-  draw_if_needed(result.start.state, draws_hub);
+  draw_if_needed(result.start.state, wish);
   result.start.state.boot = 1;
   result.start.nodes.first = result.start.state.node_mark;
   result.start.groups.first = result.start.state.group_mark;
@@ -268,7 +269,7 @@ Result<StartState> go_on_from(std::unique_ptr<StateFolder> folder,
   Result<HubStart> start = next_start(found ? *found : new_state(!folder->was_used()), wish.wall);
   if (!start)
     return Error{"cannot go on from " + folder->path() + "/state: " + start.error().sentence};
-  draw_if_needed(start->state, wish.draws_hub);
+  draw_if_needed(start->state, wish);
   if (const std::string error = folder->write(start->state); !error.empty()) return Error{error};
   return StartState{std::move(*start), proto::HubInstance{random_bits()}, std::move(folder)};
 }
@@ -281,7 +282,7 @@ bool is_there(const std::string& path) {
 StartState without_folder(const std::string& why, const StateWish& wish) {
   log_warning("the hub keeps nothing over a restart (" + why +
               "): nodes then get new ids; --state-dir DIR names a folder for its state");
-  return in_memory(false, wish.draws_hub);
+  return in_memory(false, wish);
 }
 
 }  // namespace
@@ -304,7 +305,7 @@ Result<StartState> start_state(const StateWish& wish) {
   std::string path = wish.folder;
   if (!asked_for) {
     const std::string name = state_folder_name(wish.address);
-    if (name.empty()) return in_memory(true, wish.draws_hub);
+    if (name.empty()) return in_memory(true, wish);
     const Result<std::string> place = default_state_folder(name);
     if (!place) return without_folder(place.error().sentence, wish);
     path = *place;

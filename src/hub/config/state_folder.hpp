@@ -67,6 +67,7 @@ class StateFolder {
 struct StateWish {
   std::string folder;      ///< as the configuration says; "": the default
   bool draws_hub = false;  ///< it needs a hub id of its own, and has none configured
+  HubId drawn{};           ///< that it drew in place of another one; 0: none
   ListenUrl address;       ///< the first that the hub was told to listen on, as it was told
   std::chrono::milliseconds wall{};  ///< since 1970
 };

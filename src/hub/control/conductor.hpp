@@ -103,12 +103,19 @@ class Conductor final : private Administration {
   /// here at once and on each shard before its next turn. Says in the log what came of it.
   Reloading reload() override;
 
-  /// Somebody who may asked for the end of the hub.
-  [[nodiscard]] bool drain_wanted() const { return drain_wanted_; }
+  /// Somebody who may asked for the end of the hub, or it is to begin anew with another id.
+  [[nodiscard]] bool drain_wanted() const { return ends_ || redrawn(); }
+  void want_drain() override { ends_ = true; }
+  /// The id with which the hub is to begin anew, unless somebody asked for its end.
+  [[nodiscard]] std::optional<HubId> redrawn() const {
+    return ends_ || links_ == nullptr ? std::nullopt : links_->redrawn();
+  }
   /// Nobody new is admitted, and the shards say GOODBYE to everybody once what waits is written.
   void drain();
   [[nodiscard]] bool drained() const { return draining_ && shards_to_drain_ == 0; }
 
+  /// Null: a hub alone.
+  [[nodiscard]] const Links* links() const { return links_.get(); }
   [[nodiscard]] const Membership& membership() const { return membership_; }
   [[nodiscard]] const Watches& watches() const { return watches_; }
 
@@ -137,7 +144,6 @@ class Conductor final : private Administration {
   [[nodiscard]] Session* find(const SessionRef& ref, NodeId node);
   [[nodiscard]] NodeId node_id(const Session& session) const;
 
-  void want_drain() override { drain_wanted_ = true; }
   void log_level_set(LogLevel level) override;
   std::string keep_state(std::chrono::milliseconds now) override {
     return keeper_.keep_at_once(membership_, now);
@@ -159,8 +165,8 @@ class Conductor final : private Administration {
   std::unique_ptr<NetworkOverview> overview_;        ///< with links_
   std::unique_ptr<RemoteRequests> remote_requests_;  ///< with links_
   bool returns_published_ =
-      false;  ///< after a restart: to the shards nodes that are not back yet count as away
-  bool drain_wanted_ = false;
+      false;           ///< after a restart: to the shards nodes that are not back yet count as away
+  bool ends_ = false;  ///< somebody asked for it
   bool draining_ = false;
   std::size_t shards_to_drain_ = 0;
 };

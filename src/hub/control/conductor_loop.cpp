@@ -172,7 +172,6 @@ struct ConductorLoop::Impl {
     see_off_leaving();
     tell_rest();
     arm_timer();
-    if (wiring.conductor.drain_wanted() && !stopping) begin_drain();
     end_if_all_left();
     if (wiring.inbox.empty() && turns.empty()) {
       wiring.inbox.waker().prepare_to_sleep();
@@ -215,7 +214,9 @@ struct ConductorLoop::Impl {
     });
   }
 
+  /// To be called last by all that the conductor took part in.
   void arm_timer() {
+    if (wiring.conductor.drain_wanted() && !stopping) begin_drain();
     std::optional<milliseconds> deadline = wiring.conductor.next_deadline();
     const auto sooner = [&deadline](std::optional<milliseconds> other) {
       if (other && (!deadline || *other < *deadline)) deadline = other;
@@ -252,6 +253,7 @@ struct ConductorLoop::Impl {
   void watch_signals() {
     signals.async_wait([this](const error_code& error, int number) {
       if (error) return;
+      wiring.conductor.want_drain();
       if (stopping) {
         log_warning("second signal: ending without waiting");
         context.stop();

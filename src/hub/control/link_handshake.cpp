@@ -42,8 +42,10 @@ std::optional<Goodbye> LinkHandshake::refusal_of(const proto::HubIntroduction& s
       return Goodbye{GoodbyeCode::copied,
                      "another hub with the same state folder is linked already; delete the state "
                      "folder on one of the machines that have a copy of it"};
-    case LinkAdmission::id_taken:
-    case LinkAdmission::draw_again: {
+    case LinkAdmission::draw_again:
+      return Goodbye{GoodbyeCode::draining,
+                     "this hub has the same hub id, and draws another one; try again"};
+    case LinkAdmission::id_taken: {
       const bool own = said.hub.hub == parts_.facts.id;
       const std::string holder = own ? "hub '" + parts_.facts.name + "'" : "another hub";
       return Goodbye{GoodbyeCode::id_taken, "hub id " + std::to_string(said.hub.hub.value()) +

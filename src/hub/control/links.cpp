@@ -76,6 +76,7 @@ std::optional<Goodbye> Links::admit(Stranger& stranger, const proto::Hello& hell
 /// the first one was heard within two keep-alives.
 std::optional<Goodbye> Links::judge(const proto::HubIntroduction& said, Moment moment) {
   const LinkAdmissionAnswer answer = network_.admit({said.hub, said.instance, said.configured});
+  if (answer.admission == LinkAdmission::draw_again) draw_again();
   if (answer.admission != LinkAdmission::ask_old_link) return handshake_.refusal_of(said, answer);
   HubLink* old = find(answer.old_link);
   if (old == nullptr) return std::nullopt;
@@ -110,6 +111,7 @@ void Links::on_dialled(LinkNumber number, Result<net::Welcomed, net::NetError> o
     if (copied) return link->dial_after(HubLink::kCopyPause, moment.now);
     link->dial_again(wiring_.random(), moment.now);
   };
+  if (!outcome && outcome.error().goodbye == GoodbyeCode::id_taken) draw_again();
   if (!outcome)
     return fail(outcome.error().sentence, outcome.error().goodbye == GoodbyeCode::copied);
   const proto::Welcome& welcome = outcome->welcome;
@@ -316,6 +318,7 @@ void Links::leave_network(Verdict verdict, Moment moment) {
                    " is kept by another hub of the network; give one of them another one with "
                    "--hub-id";
   log_line(LogLevel::error, {"left", "network"}, "left the network: " + sentence);
+  if (!copied) draw_again();
   network_.leave();
   for (const auto& [number, link] : links_) {
     if (!link->place) continue;

@@ -67,6 +67,9 @@ class Links {
   /// No link is dialled or taken any more.
   void drain() { draining_ = true; }
 
+  /// The id to begin anew with, once another hub was found to keep the one that this hub drew.
+  [[nodiscard]] std::optional<HubId> redrawn() const { return redrawn_; }
+
   [[nodiscard]] NextHops& next_hops() { return next_hops_; }
   [[nodiscard]] const NetworkState& network() const { return network_; }
   /// Says what is due, and publishes what follows from it.
@@ -91,6 +94,11 @@ class Links {
   void withdraw(HubLink& link);
   void close(const HubLink& link, proto::GoodbyeCode code, std::string sentence);
   void send_all(std::span<const Sending> sendings);
+  /// Nothing happens where the id is a configured one.
+  void draw_again() {
+    if (!wiring_.facts.id_configured && !redrawn_)
+      redrawn_ = network_.draw_hub_id(wiring_.random());
+  }
   void leave_network(Verdict verdict, Moment moment);
   void publish_routes();
   void send(const HubLink& link, proto::Kind kind, std::span<const std::byte> payload);
@@ -108,6 +116,7 @@ class Links {
   std::map<std::uint32_t, LinkNumber> by_generation_;  ///< of those with a place
   std::uint32_t last_number_ = 0;
   bool draining_ = false;
+  std::optional<HubId> redrawn_;
 };
 
 }  // namespace gimnet::hub

@@ -94,6 +94,10 @@ TEST_F(StartStateTest, AHubIdIsDrawnOnceAndKept) {
   EXPECT_GE(drawn.value(), kDrawnHubMin);
   EXPECT_EQ(start(true), drawn);
   EXPECT_EQ(start(false), drawn) << "its nodes have ids of that hub";
+  StateWish redrawn = wish(folder_.path("state"));
+  redrawn.drawn = HubId{2'000};
+  EXPECT_EQ(start_state(redrawn)->start.state.drawn_hub, HubId{2'000});
+  EXPECT_EQ(start(true), HubId{2'000}) << "kept in place of the former one";
 }
 
 TEST_F(StartStateTest, AHubWithoutAFolderDrawsAtEachStart) {

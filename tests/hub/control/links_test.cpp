@@ -112,6 +112,25 @@ TEST(Links, OfTwoHubsWithOneIdTheNewcomerIsTold) {
   EXPECT_NE(refusal->sentence.find("--hub-id"), std::string::npos);
 }
 
+/// The links of a hub whose neighbour says that its hub id is taken.
+std::optional<HubId> redrawn_when_taken(bool configured) {
+  LinkRig hub(1, LinkRig::dialling());
+  hub.facts.id_configured = configured;
+  hub.links.tick(hub.moment());
+  EXPECT_FALSE(hub.links.redrawn());
+  net::NetError error(net::Fault::refused, "hub id 1 is taken");
+  error.goodbye = GoodbyeCode::id_taken;
+  hub.links.on_dialled(hub.dialled.back().link, error, hub.moment());
+  return hub.links.redrawn();
+}
+
+TEST(Links, AnIdThatNobodyConfiguredIsDrawnAnewIfItIsTaken) {
+  const auto redrawn = redrawn_when_taken(false);
+  ASSERT_TRUE(redrawn);
+  EXPECT_GE(redrawn->value(), 1'024);
+  EXPECT_FALSE(redrawn_when_taken(true));
+}
+
 TEST(Links, AHubThatMeetsItselfTriesAgainLater) {
   LinkRig hub(1, LinkRig::dialling());
   hub.links.tick(hub.moment());
