@@ -8,6 +8,7 @@
 #include "fuzz/support/control_round_trip.hpp"
 #include "proto/control/names.hpp"
 #include "proto/control/route.hpp"
+#include "proto/control/route_groups.hpp"
 #include "proto/control/route_names.hpp"
 
 namespace {
@@ -58,6 +59,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   fuzz::check_message<route::NamesKnown>(payload.span());
   fuzz::check_message<route::Names>(payload.span());
   fuzz::check_message<route::NamesTaken>(payload.span());
+  fuzz::check_message<route::Join>(payload.span());
+  fuzz::check_message<route::Leave>(payload.span());
+  fuzz::check_message<route::JoinsEnd>(payload.span());
+  fuzz::check_message<route::Joined>(payload.span());
   check_bounds(payload.span());
   check_names(payload.span());
   return 0;

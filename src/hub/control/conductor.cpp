@@ -64,15 +64,16 @@ Conductor::Conductor(HubFacts facts, Placement placement, Limits& limits, Wiring
       publisher_(facts_.id, facts_.shards, wiring_.tables),
       keeper_(wiring_.start.state, wiring_.keep_state),
       names_({facts_, limits_, membership_, watches_}),
-      runner_(
-          {facts_, limits_, wiring_.shards, membership_, watches_, publisher_, keeper_, &names_}),
+      groups_({facts_, limits_, wiring_.shards, membership_, publisher_, names_}),
+      runner_({facts_, limits_, wiring_.shards, membership_, watches_, publisher_, keeper_, &names_,
+               &groups_}),
       returns_published_(membership_.sessions().returns_until().has_value()) {
   GIMNET_CHECK(wiring_.shards.shards() == facts_.shards);
   if (wiring_.network) {
     links_ = std::make_unique<Links>(
         wiring_.network->options,
         Links::Wiring{facts_, limits_, wiring_.shards, membership_.sessions().slots(),
-                      wiring_.network->routes, names_, wiring_.network->dial,
+                      wiring_.network->routes, names_, groups_, wiring_.network->dial,
                       wiring_.network->random});
     overview_ = std::make_unique<NetworkOverview>(
         NetworkOverview::Parts{facts_, *links_, wiring_.sessions});
@@ -104,7 +105,7 @@ std::optional<Goodbye> Conductor::admit(Stranger& stranger, const proto::Hello& 
   request.wall = milliseconds{moment.wall_ns / 1'000'000};
   Effects effects;
   const auto joined = membership_.join(request, moment.now, effects);
-  runner_.carry_out(effects, moment.now);
+  carry_out(effects, moment.now);
   if (!joined) return joined.error();
   attach(stranger, hello, *joined, moment);
   return std::nullopt;
@@ -172,8 +173,9 @@ void Conductor::on_event(ShardEvent event, milliseconds now) {
   if (const auto* frame = std::get_if<ControlFrameEvent>(&event.what)) {
     is_link(frame->node) ? on_link_frame(*frame, now) : on_frame(*frame, now);
   } else if (const auto* detached = std::get_if<DetachedEvent>(&event.what)) {
-    is_link(detached->node) ? links_->on_detached(*detached, moment(now))
-                            : on_detached(*detached, now);
+    if (!is_link(detached->node)) return on_detached(*detached, now);
+    links_->on_detached(*detached, moment(now));
+    settle(now);
   } else if (const auto* missed = std::get_if<EventsMissedEvent>(&event.what)) {
     if (const Session* session = find(missed->session, missed->node))
       runner_.events_missed(*session, missed->attachment);
@@ -225,13 +227,14 @@ void Conductor::on_frame(const ControlFrameEvent& event, milliseconds now) {
       refusal ? proto::encode_refusal(view->header, *refusal) : handle(context, request);
   const proto::Status status = proto::peek_status(answer);
   request_counters_.count(kind, view->header.operation, status);
-  runner_.carry_out(effects, now);
+  carry_out(effects, now);
   SendControlCommand command;
   command.session = event.session;
   command.attachment = event.attachment;
   command.frame = control_frame(kind, event.node, facts_.id, answer);
   command.answers = 1;
   command.counts = context.counts;
+  if (context.joins && groups_.hold(*context.joins, shard, command, now)) return;
   wiring_.shards.send(shard, std::move(command));
   if (is_odd(status)) on_oddity(event, now);
 }
@@ -250,7 +253,7 @@ void Conductor::on_link_frame(const ControlFrameEvent& event, milliseconds now) 
   const std::span<const std::byte> payload = std::span{event.frame}.subspan(proto::kHeaderSize);
   if (kind == proto::Kind::route) {
     links_->on_route(event.session, event.attachment, payload, moment(now));
-    return settle_names(now);
+    return settle(now);
   }
   if (!remote_requests_->take(event, now)) return;
   const auto view = proto::split_control(payload);
@@ -294,7 +297,7 @@ void Conductor::on_detached(const DetachedEvent& event, milliseconds now) {
   watches_.connection_ended(session->index);
   membership_.connection_ended(*session, {event.said_by_peer, event.code, event.sentence}, now,
                                effects);
-  runner_.carry_out(effects, now);
+  carry_out(effects, now);
 }
 
 void Conductor::close(const Session& session, GoodbyeCode code, std::string sentence) {
@@ -305,7 +308,7 @@ void Conductor::close(const Session& session, GoodbyeCode code, std::string sent
 void Conductor::tick(milliseconds now) {
   if (links_ != nullptr) {
     links_->tick(moment(now));
-    settle_names(now);
+    settle(now);
     remote_requests_->tick(now);
   }
   Effects effects;
@@ -317,7 +320,7 @@ void Conductor::tick(milliseconds now) {
     wiring_.tables.nodes.expect_nobody();
     returns_published_ = false;
   }
-  runner_.carry_out(effects, now);
+  carry_out(effects, now);
   publisher_.collect();
 }
 
@@ -328,7 +331,7 @@ std::optional<milliseconds> Conductor::next_deadline() const {
   const auto links_due = links_ != nullptr ? links_->next_deadline() : std::nullopt;
   const auto answers_due = links_ != nullptr ? remote_requests_->next_due() : std::nullopt;
   for (const std::optional<milliseconds>& other :
-       {keeper_.again_at(), returns_until, links_due, answers_due}) {
+       {keeper_.again_at(), returns_until, links_due, answers_due, groups_.next_due()}) {
     if (other && (!deadline || *other < *deadline)) deadline = other;
   }
   return deadline;

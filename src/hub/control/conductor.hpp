@@ -9,6 +9,7 @@
 
 #include "hub/control/acceptor.hpp"
 #include "hub/control/effect_runner.hpp"
+#include "hub/control/group_links.hpp"
 #include "hub/control/handle/request.hpp"
 #include "hub/control/hub_facts.hpp"
 #include "hub/control/links.hpp"
@@ -126,11 +127,19 @@ class Conductor final : private Administration {
                                        Moment moment) const;
   void on_frame(const ControlFrameEvent& event, std::chrono::milliseconds now);
   void on_link_frame(const ControlFrameEvent& event, std::chrono::milliseconds now);
-  /// Carries out what follows from names of other hubs.
-  void settle_names(std::chrono::milliseconds now) {
+  /// Also says to other hubs what follows.
+  void carry_out(const Effects& effects, std::chrono::milliseconds now) {
+    runner_.carry_out(effects, now);
+    if (links_ == nullptr) return;
+    links_->send_joins();
+    runner_.carry_out(groups_.take_effects(), now);
+  }
+  /// Carries out what follows from names and groups of other hubs.
+  void settle(std::chrono::milliseconds now) {
     Effects effects;
     names_.settle(now, effects);
-    runner_.carry_out(effects, now);
+    carry_out(effects, now);
+    groups_.release(now);
   }
   [[nodiscard]] HandlerContext context_for(Effects& effects, std::chrono::milliseconds now);
   [[nodiscard]] Links::Moment moment(std::chrono::milliseconds now) const {
@@ -160,6 +169,7 @@ class Conductor final : private Administration {
   RequestCounters request_counters_;
   StateKeeper keeper_;
   NetworkNames names_;
+  GroupLinks groups_;
   EffectRunner runner_;                              ///< on all of these
   std::unique_ptr<Links> links_;                     ///< nullptr: a hub alone
   std::unique_ptr<NetworkOverview> overview_;        ///< with links_

@@ -53,6 +53,11 @@ void EffectRunner::run(const NodeChanged& effect) {
 
 void EffectRunner::run(const GroupChanged& effect) {
   parts_.publisher.publish_group(effect.index, parts_.membership);
+  if (parts_.groups != nullptr) parts_.groups->note_own(effect.index);
+}
+
+void EffectRunner::run(const AwayGroupChanged& effect) {
+  if (parts_.groups != nullptr) parts_.groups->note_away(effect.group);
 }
 
 void EffectRunner::run(const MemberChanged& effect) {
@@ -85,8 +90,7 @@ void EffectRunner::run(const PaceDue& effect) {
 void EffectRunner::run(const PaceEnded& effect) {
   const Session* session = find(effect.subscriber);
   if (session == nullptr) return;  // its subscriptions end with it
-  parts_.shards.send(session->place.shard,
-                     EndPaceCommand{ref_of(session->place), group_id(effect.group)});
+  parts_.shards.send(session->place.shard, EndPaceCommand{ref_of(session->place), effect.group});
 }
 
 void EffectRunner::run(const RetainedDropped& effect) {

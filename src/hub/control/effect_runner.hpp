@@ -2,6 +2,7 @@
 
 #include <chrono>
 
+#include "hub/control/group_links.hpp"
 #include "hub/control/hub_facts.hpp"
 #include "hub/control/network_names.hpp"
 #include "hub/control/shard_proxy.hpp"
@@ -31,6 +32,7 @@ class EffectRunner {
     TablePublisher& publisher;
     StateKeeper& keeper;
     NetworkNames* names = nullptr;  ///< or none: a hub alone
+    GroupLinks* groups = nullptr;   ///< or none: a hub alone
   };
   explicit EffectRunner(const Parts& parts)
       : parts_(parts),
@@ -51,6 +53,7 @@ class EffectRunner {
  private:
   void run(const NodeChanged& effect);
   void run(const GroupChanged& effect);
+  void run(const AwayGroupChanged& effect);
   void run(const MemberChanged& effect);
   void run(const SessionEnded& effect);
   void run(const RenumberDue& effect);

@@ -69,6 +69,18 @@ proto::HubIntroduction LinkHandshake::introduce(const LinkTerms& terms) const {
   return said;
 }
 
+proto::Welcome LinkHandshake::welcome(const proto::HubIntroduction& said, const LinkTerms& terms,
+                                      std::int64_t wall_ns) const {
+  proto::Welcome welcome;
+  welcome.node = make_id<NodeId>(said.hub.hub, kHubIndex);
+  welcome.hub = parts_.facts.id;
+  welcome.hub_name = parts_.facts.name;
+  welcome.frame_length_max = static_cast<std::uint32_t>(parts_.limits.frame_bytes);
+  welcome.hub_time_ns = wall_ns;
+  welcome.introduction = introduce(terms);
+  return welcome;
+}
+
 proto::Hello LinkHandshake::hello_for(const HubLink& link) const {
   proto::Hello hello;
   hello.role = proto::Role::hub;

@@ -25,6 +25,8 @@ class LinkHandshake {
   explicit LinkHandshake(const Parts& parts) : parts_(parts) {}
 
   [[nodiscard]] proto::HubIntroduction introduce(const LinkTerms& terms) const;
+  [[nodiscard]] proto::Welcome welcome(const proto::HubIntroduction& said, const LinkTerms& terms,
+                                       std::int64_t wall_ns) const;
   /// REQUIRES: link.is_dialled().
   [[nodiscard]] proto::Hello hello_for(const HubLink& link) const;
   /// Why that stranger may not link, whoever its hub is; nothing: it may.

@@ -61,12 +61,7 @@ std::optional<Goodbye> Links::admit(Stranger& stranger, const proto::Hello& hell
   command.known_taken = hello.resume_taken;
   command.peer_resume_bytes = hello.resume_buffer_bytes;
   command.peer_frame_bytes = hello.frame_length_max;
-  command.welcome.node = make_id<NodeId>(said.hub.hub, kHubIndex);
-  command.welcome.hub = wiring_.facts.id;
-  command.welcome.hub_name = wiring_.facts.name;
-  command.welcome.frame_length_max = static_cast<std::uint32_t>(wiring_.limits.frame_bytes);
-  command.welcome.hub_time_ns = moment.wall_ns;
-  command.welcome.introduction = handshake_.introduce(options_.accepted);
+  command.welcome = handshake_.welcome(said, options_.accepted, moment.wall_ns);
   attach(*link, std::move(command), said, options_.accepted, moment);
   advance(moment);
   return std::nullopt;
@@ -152,6 +147,7 @@ void Links::attach(HubLink& link, AttachCommand command, const proto::HubIntrodu
     link.place = wiring_.slots.take();
     by_generation_[link.place->generation] = link.number();
   }
+  wiring_.groups.set_place(link.number(), *link.place, said.hub.hub);
   link.begin_connection(said, terms, moment.now);
   link.last_error.clear();
   command.session = ref_of(*link.place);
@@ -177,6 +173,7 @@ void Links::begin_exchange(HubLink& link, Moment moment) {
       link.number(), {link.identity(), link.name(), link.is_dialled(), link.cost()}, moment.now);
   network_.set_damped(link.number(), link.damped_until().has_value());
   wiring_.names.begin_connection(link.number(), moment.now);
+  wiring_.groups.begin_connection(link.number());
 }
 
 void Links::on_route(const SessionRef& session, std::uint32_t attachment,
@@ -203,11 +200,9 @@ void Links::on_route(const SessionRef& session, std::uint32_t attachment,
       network_.take_digest(link->number(), heard->digest, moment.now);
       break;
     }
-    case proto::route::Operation::names_known:
-    case proto::route::Operation::names:
-    case proto::route::Operation::names_taken:
+    default:
       wiring_.names.take(link->number(), payload, moment.now);
-      break;
+      wiring_.groups.take(link->number(), payload);
   }
   advance(moment);
 }
@@ -240,6 +235,7 @@ void Links::withdraw(HubLink& link) {
   link.epoch = 0;
   network_.end_link(link.number());
   wiring_.names.end_link(link.number());
+  wiring_.groups.end_link(link.number());
   if (!link.place) return;
   const Place place = *std::exchange(link.place, std::nullopt);
   by_generation_.erase(place.generation);
@@ -296,7 +292,9 @@ void Links::advance(Moment moment) {
   if (map_seen_ != network_.maps()) {
     map_seen_ = network_.maps();
     wiring_.names.set_reachable(network_.map(), network_.store(), moment.now);
+    wiring_.groups.set_next_hops(network_.map());
   }
+  send_joins();
   send_all(wiring_.names.take_sendings(moment.now));
   if (const Verdict verdict = network_.verdict(); verdict != Verdict::stay)
     leave_network(verdict, moment);

@@ -13,6 +13,7 @@
 
 #include "base/result.hpp"
 #include "hub/control/acceptor.hpp"
+#include "hub/control/group_links.hpp"
 #include "hub/control/hub_facts.hpp"
 #include "hub/control/hub_link.hpp"
 #include "hub/control/link_handshake.hpp"
@@ -43,6 +44,7 @@ class Links {
     SlotPool& slots;
     RouteTable& routes;
     NetworkNames& names;
+    GroupLinks& groups;
     Dial dial;
     std::function<std::uint64_t()> random;  ///< 64 bits that nobody can guess
   };
@@ -69,6 +71,8 @@ class Links {
 
   /// The id to begin anew with, once another hub was found to keep the one that this hub drew.
   [[nodiscard]] std::optional<HubId> redrawn() const { return redrawn_; }
+  /// Says what subscriptions changed.
+  void send_joins() { send_all(wiring_.groups.take_sendings()); }
 
   [[nodiscard]] NextHops& next_hops() { return next_hops_; }
   [[nodiscard]] const NetworkState& network() const { return network_; }

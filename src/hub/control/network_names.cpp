@@ -1,5 +1,6 @@
 #include "hub/control/network_names.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "base/id_text.hpp"
@@ -104,14 +105,38 @@ void NetworkNames::settle(milliseconds now, Effects& effects) {
   for (const NameChange& change : exchange_->take_changes()) {
     const bool service =
         (change.before && change.before->service) || (change.after && change.after->service);
-    if (service) parts_.membership.services().note_moved(change.name, effects);
+    if (service) note_service(change, now, effects);
     parts_.watches.note(change);
   }
   if (std::exchange(dropped_copies_, exchange_->copies().dropped_copies()) !=
       exchange_->copies().dropped_copies()) {
-    parts_.membership.services().note_all_moved(effects);
+    std::vector<std::string> all;
+    for (const auto& [name, topic] : parts_.membership.services().by_name()) {
+      if (!topic.provided()) all.push_back(name);
+    }
+    for (const std::string& name : all)
+      parts_.membership.services().note_moved(name, away_service(name), now, effects);
     parts_.watches.begin_again();
   }
+}
+
+/// Links may want the group, whether nodes here do or not.
+void NetworkNames::note_service(const NameChange& change, milliseconds now, Effects& effects) {
+  parts_.membership.services().note_moved(change.name, away_service(change.name), now, effects);
+  for (const auto* claim : {&change.before, &change.after}) {
+    if (*claim && (*claim)->service)
+      effects.emplace_back(AwayGroupChanged{(*claim)->service->group});
+  }
+}
+
+std::optional<AwayService> NetworkNames::away_service(std::string_view full_name) const {
+  const auto known = exchange_ ? exchange_->copies().find(full_name) : std::nullopt;
+  if (!known || known->hub == parts_.facts.id || !known->claim->service) return std::nullopt;
+  const route::ServiceClaim& service = *known->claim->service;
+  if (service.direction != proto::ns::Direction::provides) return std::nullopt;
+  const bool counted = service.delivery == proto::ns::Delivery::sync;
+  return AwayService{service.group, known->claim->node, counted ? std::max(1u, service.window) : 0,
+                     service.retain};
 }
 
 void NetworkNames::let_go(const KnownName& winner, milliseconds now, Effects& effects) {

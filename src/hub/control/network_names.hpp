@@ -49,6 +49,8 @@ class NetworkNames {
   /// Lets go of names that were lost, and tells own nodes what changed elsewhere.
   void settle(std::chrono::milliseconds now, Effects& effects);
 
+  /// The service of another hub that gives data under that name; nothing: there is none.
+  [[nodiscard]] std::optional<AwayService> away_service(std::string_view full_name) const;
   /// Null: the hub has had no link yet.
   [[nodiscard]] const NameCopies* copies() const {
     return exchange_ ? &exchange_->copies() : nullptr;
@@ -62,6 +64,7 @@ class NetworkNames {
   void begin();
   void put(const Session& session);
   void put(const Topic& topic);
+  void note_service(const NameChange& change, std::chrono::milliseconds now, Effects& effects);
   void let_go(const KnownName& winner, std::chrono::milliseconds now, Effects& effects);
 
   const Parts parts_;

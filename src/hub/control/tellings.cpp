@@ -39,7 +39,7 @@ void Tellings::work_off(std::uint64_t& most) {
     const auto rest = all.subspan(static_cast<std::size_t>(first));
     const auto piece = rest.first(std::min<std::uint64_t>(rest.size(), most));
     tell(*topic, piece);
-    if (round_->joins && topic->service) join(*topic, piece, true);
+    if (round_->joins && topic->group(parts_.facts.id)) join(*topic, piece, true);
     most -= piece.size();
     if (piece.size() == rest.size()) {
       round_.reset();
@@ -82,7 +82,7 @@ void Tellings::tell(const Topic& topic, std::span<const NodeIndex> subscribers) 
 /// In the table first: a subscriber that is paced asks for the last message at once.
 void Tellings::join(const Topic& topic, std::span<const NodeIndex> subscribers,
                     bool with_event) const {
-  parts_.publisher.publish_members(topic.service->group, subscribers, parts_.membership);
+  parts_.publisher.publish_members(*topic.group(parts_.facts.id), subscribers, parts_.membership);
   for (const NodeIndex subscriber : subscribers) {
     if (const Session* session = find(subscriber)) begin_pace(topic, *session, with_event);
   }
@@ -120,7 +120,7 @@ void Tellings::add_moved(const Session& session, std::uint64_t change,
 
 void Tellings::join_moved(const Session& session, std::uint64_t change) const {
   for (const Topic* topic : parts_.membership.services().moved_since(session.index, change)) {
-    if (topic->service) join(*topic, {&session.index, 1}, false);
+    if (topic->group(parts_.facts.id)) join(*topic, {&session.index, 1}, false);
   }
 }
 
@@ -129,9 +129,9 @@ void Tellings::begin_pace(const Topic& topic, const Session& subscriber, bool wi
   if (!pace) return;
   PaceCommand command;
   command.session = ref_of(subscriber.place);
-  command.group = make_id(parts_.facts.id, topic.service->group);
+  command.group = *topic.group(parts_.facts.id);
   command.terms = {pace->window, pace->depth, pace->interval_us};
-  command.retained = topic.service->terms.retain;
+  command.retained = topic.retains();
   command.was_plain = topic.once_plain.contains(subscriber.index);
   command.number = pace->number;
   command.with_event = with_event;
@@ -139,8 +139,8 @@ void Tellings::begin_pace(const Topic& topic, const Session& subscriber, bool wi
 }
 
 proto::Payload Tellings::subscribers_event(const Topic& topic) const {
-  return proto::encode(ns::Subscribers{make_id(parts_.facts.id, topic.service->group),
-                                       static_cast<std::uint32_t>(topic.subscribers.size())});
+  return proto::encode(
+      ns::Subscribers{make_id(parts_.facts.id, topic.service->group), topic.subscriber_count()});
 }
 
 std::vector<std::byte> Tellings::moved_frame(const Topic& topic, NodeId to,

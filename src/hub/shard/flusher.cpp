@@ -66,6 +66,7 @@ void Flusher::flush(Connection& connection) {
   counters.delivered.add(state_.tally.delivered - delivered_before);
   if (sent_data && connection.progress) connection.progress->data_end = connection.sent_bytes;
   if (sent != 0) connection.last_sent_ms = state_.now_ms;
+  if (connection.link != nullptr && connection.paced) state_.pacer.on_written(connection);
   if (connection.events == EventState::missed && connection.outbox.control().empty())
     ask_to_be_told(connection);
   switch (result) {

@@ -334,6 +334,7 @@ void IoShard::begin_pace(const PaceCommand& command) {
   PacedSubscription& subscription = state_.pacer.subscribe(
       *connection, command.group, command.terms, command.was_plain, command.number);
   subscription.retained = command.retained;
+  subscription.by_queue = connection->is_link();
   if (begins && command.retained) state_.retained.ask_start(subscription);
 }
 

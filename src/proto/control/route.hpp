@@ -21,6 +21,10 @@ enum class Operation : std::uint16_t {
   names_known = 4,
   names = 5,
   names_taken = 6,
+  join = 7,
+  leave = 8,
+  joins_end = 9,
+  joined = 10,
 };
 
 /// A part has at most so many neighbours, and a record at most so many parts: the hub in the middle

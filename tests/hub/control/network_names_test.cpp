@@ -44,9 +44,16 @@ class Side {
     carry_out(effects);
     return *session;
   }
-  void advertise(const Session& session, const std::string& full_name) {
+  void advertise(const Session& session, const std::string& full_name,
+                 const ServiceTerms& terms = {}) {
     Effects effects;
-    ASSERT_TRUE(membership.services().advertise(session.index, full_name, {}, now, effects));
+    ASSERT_TRUE(membership.services().advertise(session.index, full_name, terms, now, effects));
+    carry_out(effects);
+  }
+  void withdraw(const Session& session, const std::string& full_name) {
+    Effects effects;
+    const GroupIndex group = membership.services().find(full_name)->service->group;
+    ASSERT_FALSE(membership.services().withdraw(session.index, group, now, effects));
     carry_out(effects);
   }
   /// As EffectRunner does.
@@ -232,9 +239,40 @@ TEST_F(NetworkNamesTest, ASubscriberHearsOfAServiceOfAnotherHub) {
   EXPECT_EQ(here_.moved_services, std::vector<std::string>{"robot/odom"});
   const auto after =
       here_.ask<ns::SubscribeAnswer>(handle_subscribe, asker, ns::Subscribe{.name = "robot/odom"});
-  ASSERT_FALSE(after) << "its messages do not cross links";
-  EXPECT_EQ(after.error().status, proto::Status::not_supported);
-  EXPECT_NE(after.error().sentence.find("hub 9"), std::string::npos);
+  ASSERT_TRUE(after);
+  EXPECT_EQ(after->provider, make_id(HubId{9}, robot.index));
+  const Topic* topic = here_.membership.services().find_group(after->group);
+  ASSERT_NE(topic, nullptr) << "its messages cross links";
+  EXPECT_EQ(topic->away->group, make_id<GroupId>(HubId{9}, 1));
+  there_.withdraw(robot, "robot/odom");
+  settle();
+  EXPECT_EQ(here_.membership.services().find_group(after->group), nullptr);
+  EXPECT_EQ(here_.moved_services.size(), 2u);
+}
+
+TEST_F(NetworkNamesTest, ASubscriberOfAnotherHubsServiceIsPacedAsItsTermsSay) {
+  const Session& asker = here_.join("asker");
+  Session& robot = there_.join("robot");
+  connect();
+  ServiceTerms terms;
+  terms.delivery = ns::Delivery::sync;
+  terms.window = 4;
+  terms.retain = true;
+  there_.advertise(robot, "robot/scan", terms);
+  settle();
+  const auto answer = here_.ask<ns::SubscribeAnswer>(
+      handle_subscribe, asker, ns::Subscribe{.name = "robot/scan", .window = 2});
+  ASSERT_TRUE(answer);
+  EXPECT_EQ(answer->window, 2u);
+  EXPECT_TRUE(answer->retain);
+  const Topic* topic = here_.membership.services().find("robot/scan");
+  EXPECT_TRUE(topic->retains());
+  EXPECT_EQ(topic->window_of(asker.index), 2u);
+  terms.window = 1;
+  there_.advertise(robot, "robot/scan", terms);
+  settle();
+  EXPECT_EQ(topic->window_of(asker.index), 1u) << "another group, with another window";
+  EXPECT_EQ(here_.membership.services().find_group(answer->group), nullptr);
 }
 
 TEST_F(NetworkNamesTest, OfTwoHoldersOneLosesItsName) {

@@ -284,6 +284,47 @@ TEST(LinkReader, NoBroadcastOfANodeGoesToALinkByItself) {
   EXPECT_THAT(link.frames, IsEmpty());
 }
 
+/// Group 5 of the hub `kFar`, whose messages come over the link to `parent`.
+void publish_away(HubRig& rig, GroupMembers& group, HubId parent,
+                  const std::vector<FakeNode*>& members) {
+  group.parent = parent;
+  group.provider = make_id<NodeId>(kFar, 1);
+  group.by_shard.resize(2);
+  for (const FakeNode* member : members)
+    group.by_shard[member->shard.value()].put({member->session.slot, member->session.generation});
+  static_cast<void>(rig.groups().exchange_away(make_id<GroupId>(kFar, 5), &group));
+}
+
+TEST(LinkReader, AGroupOfAnotherHubComesFromTheParentAlone) {
+  for (const std::size_t shard : {0u, 1u}) {
+    HubRig rig(2);
+    FakeNode& node = rig.join(0);
+    FakeNode& parent = rig.link(shard, kNear);
+    FakeNode& child = rig.link(0, HubId{40});
+    FakeNode& stranger = rig.link(1, HubId{50});
+    GroupMembers group;
+    publish_away(rig, group, kNear, {&node, &child});
+    const std::uint32_t dst = make_id<GroupId>(kFar, 5).value();
+    const std::uint32_t provider = make_id<NodeId>(kFar, 1).value();
+    const FrameSpec spec{.kind = Kind::group, .flags = proto::kFlagReport};
+    rig.write(parent, frame_after(1, dst, "scan", spec, provider));
+    rig.write(stranger, frame_after(1, dst, "another way", spec, provider));
+    rig.write(parent, frame_after(1, dst, "of another hub", spec, kSource));
+    rig.write(parent, frame_after(1, dst + 1, "nobody's", spec, provider));
+    rig.send(node, dst, "not mine", {.kind = Kind::group});
+    rig.settle();
+    EXPECT_THAT(node.texts(), ElementsAre("scan"));
+    EXPECT_THAT(child.texts(), ElementsAre("scan"));
+    EXPECT_EQ(child.frames[0].header.hops, 2);
+    EXPECT_EQ(rig.dropped(DropReason::wrong_way), 2u);
+    EXPECT_EQ(rig.dropped(DropReason::no_subscriber), 1u);
+    EXPECT_EQ(rig.dropped(DropReason::not_allowed), 1u);
+    EXPECT_THAT(parent.reports(), IsEmpty());
+    EXPECT_TRUE(rig.ledger().exact());
+    static_cast<void>(rig.groups().exchange_away(make_id<GroupId>(kFar, 5), nullptr));
+  }
+}
+
 TEST(LinkReader, WhatALinkDidNotConfirmIsUnsure) {
   HubRig rig;
   FakeNode& node = rig.join(0);

@@ -2,12 +2,12 @@
 
 import struct
 
-from stranger_parts.bitestream import OPAQUE, TEXT, U16, U64, put
+from stranger_parts.bitestream import BOOL, OPAQUE, TEXT, U16, U64, fields, put
 from stranger_parts.case import Case
-from stranger_parts.client import UNICAST, Refused
+from stranger_parts.client import GROUP, UNICAST, Refused
 
 ROUTE = 19
-RECORDS_END = 2
+RECORDS_END, JOIN, LEAVE, JOINS_END, JOINED = 2, 7, 8, 9, 10
 ID_TAKEN, COPIED = 19, 20
 OWN_HUB = 9
 
@@ -49,3 +49,48 @@ class Links(Case):
         with self.assertRaises(Refused) as refused:
             self.link(unique=known.welcome[21])
         self.assertEqual(refused.exception.args[0], COPIED)
+
+    def route(self, link, operation, body=b""):
+        link.write(ROUTE, body=struct.pack("<HH", operation, 0) + body)
+
+    def joined(self, link, group):
+        """Joins, and waits for the answer."""
+        self.route(link, JOIN, put(1, OPAQUE, struct.pack("<III", group, 0, 1)) + put(2, BOOL, True))
+        head = struct.pack("<HH", JOINED, 0)
+        got = link.wait(lambda frame: frame.kind == ROUTE and frame.body[:4] == head)
+        self.assertEqual(fields(got.body[4:])[1], struct.pack("<I", group))
+
+    def test_a_hub_joins_a_group_and_carries_its_messages(self):
+        robot = self.stranger(self.to, "robot")
+        group = robot.advertise("scan", retain=put(11, BOOL, True))[3]
+        robot.write(GROUP, group, b"kept")
+        link = self.link()
+        self.route(link, RECORDS_END)
+        self.joined(link, group)
+        self.assertEqual((link.data().body, robot.event(33)[4]), (b"kept", 1))
+        robot.write(GROUP, group, b"scan")
+        got = link.data()
+        self.assertEqual((got.kind, got.dst, got.src, got.body), (GROUP, group, robot.id, b"scan"))
+        self.route(link, LEAVE, put(1, OPAQUE, struct.pack("<I", group)))
+        self.assertEqual(robot.event(33)[4], 0)
+        self.route(link, JOINS_END)
+
+    def test_lies_about_groups_cost_others_nothing(self):
+        robot = self.stranger(self.to, "robot")
+        group = robot.advertise("scan")[3]
+        viewer = self.stranger(self.to, "viewer")
+        viewer.subscribe("robot/scan")
+        link = self.link()
+        self.route(link, RECORDS_END)
+        for first in range(0, 70_000, 500):
+            entries = b"".join(struct.pack("<III", 7 << 20 | index % 0xFFFFE + 1, 0, 1)
+                               for index in range(first + 1000, first + 1500))
+            self.route(link, JOIN, put(1, OPAQUE, entries))
+        self.route(link, JOIN, b"\0\1\0\0\3abc")
+        # A message as if it came from the provider, and one of a group that nobody wants.
+        link.write(GROUP, group, b"a lie", src=OWN_HUB << 20 | 5)
+        link.write(GROUP, OWN_HUB << 20 | 5, b"nobody's", src=OWN_HUB << 20 | 5)
+        link.write(UNICAST, viewer.id, b"behind them", src=OWN_HUB << 20 | 5)
+        self.assertEqual(viewer.data().body, b"behind them")
+        robot.write(GROUP, group, b"the truth")
+        self.assertEqual(viewer.data().body, b"the truth")

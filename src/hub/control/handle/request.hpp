@@ -52,6 +52,7 @@ struct HandlerContext {
   NetworkView* network = nullptr;                    ///< or none: a hub alone
   const NetworkNames* names = nullptr;               ///< or none: a hub alone
   std::optional<CountsBegin> counts{};               ///< what begins with the answer
+  std::optional<GroupId> joins{};  ///< of another hub: the answer waits for its messages
 };
 
 /// A request of kind NS or CTRL. Valid until: the handler returns.

@@ -172,31 +172,9 @@ proto::Payload handle_services(HandlerContext& context, const Request& request) 
       request, [&](const ns::Services& wanted) { return services(context, request, wanted); });
 }
 
-namespace {
-
-/// Messages of a service do not cross links. Those for a service that accepts them do, and who
-/// sends them subscribes to follow it.
-std::optional<proto::Refusal> elsewhere_refusal(const HandlerContext& context,
-                                                const Request& request, const std::string& name) {
-  const NameCopies* names = names_for(context, request);
-  const Topic* topic = context.membership.services().find(name);
-  if (names == nullptr || (topic != nullptr && topic->provided())) return std::nullopt;
-  const auto known = names->find(name);
-  if (!known || known->hub == context.facts.id || !known->claim->service ||
-      known->claim->service->direction != ns::Direction::provides)
-    return std::nullopt;
-  return proto::Refusal{proto::Status::not_supported,
-                        "hub " + std::to_string(known->hub.value()) + " has the service '" + name +
-                            "', and messages of services do not cross links between hubs; "
-                            "connect to that hub"};
-}
-
-}  // namespace
-
 proto::Payload handle_subscribe(HandlerContext& context, const Request& request) {
   return answer_to<ns::Subscribe>(
       request, [&](const ns::Subscribe& wanted) -> Result<ns::SubscribeAnswer, proto::Refusal> {
-        if (auto refusal = elsewhere_refusal(context, request, wanted.name)) return *refusal;
         const auto standing =
             context.membership.services().subscribed(request.session.index, wanted.name);
         const auto terms = terms_of(context.limits, wanted, standing);
@@ -206,12 +184,16 @@ proto::Payload handle_subscribe(HandlerContext& context, const Request& request)
         if (!standing || repeated != *terms) {
           if (auto refusal = count_declaration(context, request.session)) return *refusal;
         }
+        const NameCopies* names = names_for(context, request);
+        const auto away =
+            names != nullptr ? context.names->away_service(wanted.name) : std::nullopt;
         const auto topic = context.membership.services().subscribe(
-            request.session.index, wanted.name, *terms, context.effects);
+            request.session.index, wanted.name, *terms, context.effects, away);
         if (!topic) return topic.error();
+        if ((*topic)->away) context.joins = (*topic)->away->group;
         ns::SubscribeAnswer answer;
         put_state(answer, HubTitle{context.facts.id, context.facts.name}, **topic,
-                  context.membership, names_for(context, request));
+                  context.membership, names);
         answer.window = (*topic)->window_of(request.session.index);
         answer.number = terms->number;
         if (answer.window != 0 && (!standing || standing->number != terms->number))

@@ -23,9 +23,13 @@ struct NodeChanged {
 struct GroupChanged {
   GroupIndex index;
 };
+/// A group of another hub: something changed of it, or of what is wanted of it here.
+struct AwayGroupChanged {
+  GroupId group;
+};
 /// Publish whether and how that node is a member of this group.
 struct MemberChanged {
-  GroupIndex group;
+  GroupId group;
   NodeIndex subscriber;
 };
 /// Tell the shard that the session is over.
@@ -65,12 +69,12 @@ struct SubscriberTerms {
 /// member was published.
 struct PaceDue {
   NodeIndex subscriber;
-  GroupIndex group;
+  GroupId group;
 };
 /// A subscription that was paced ended.
 struct PaceEnded {
   NodeIndex subscriber;
-  GroupIndex group;
+  GroupId group;
 };
 /// That node provides the retained group no more: its last message is kept no longer. After the
 /// table has said so.
@@ -108,9 +112,10 @@ struct ServiceNoted {
   std::string full_name;
 };
 
-using Effect = std::variant<NodeChanged, GroupChanged, MemberChanged, SessionEnded, ServiceMoved,
-                            PaceDue, PaceEnded, RetainedDropped, SubscribersChanged, CloseDue,
-                            RenumberDue, StateDue, NameLost, NodeNoted, ServiceNoted>;
+using Effect =
+    std::variant<NodeChanged, GroupChanged, AwayGroupChanged, MemberChanged, SessionEnded,
+                 ServiceMoved, PaceDue, PaceEnded, RetainedDropped, SubscribersChanged, CloseDue,
+                 RenumberDue, StateDue, NameLost, NodeNoted, ServiceNoted>;
 using Effects = std::vector<Effect>;
 
 }  // namespace gimnet::hub

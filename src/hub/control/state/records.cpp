@@ -55,7 +55,7 @@ ns::ServiceRecord record_of(const HubTitle& hub, const Topic& topic) {
   record.metadata = service.terms.metadata;
   record.window = service.terms.window;
   record.retain = service.terms.retain;
-  record.subscribers = static_cast<std::uint32_t>(topic.subscribers.size());
+  record.subscribers = topic.subscriber_count();
   record.hub_name = hub.name;
   return record;
 }

@@ -45,14 +45,19 @@ proto::Refusal limit_reached(std::string_view what, std::uint64_t limit, std::st
 
 }  // namespace
 
+std::optional<GroupId> Topic::group(HubId own) const {
+  if (service) return make_id(own, service->group);
+  return away ? std::optional{away->group} : std::nullopt;
+}
+
 std::optional<SubscriberTerms> Topic::pace_of(NodeIndex subscriber) const {
-  if (!service) return std::nullopt;
+  if (!service && !away) return std::nullopt;
   const auto asked = terms.find(subscriber);
   SubscriberTerms pace = asked != terms.end() ? asked->second : SubscriberTerms{};
-  const bool counted = service->terms.delivery == proto::ns::Delivery::sync;
-  const std::uint32_t most = counted ? service->terms.window : 0;
+  std::uint32_t most = away ? away->window : 0;
+  if (service && service->terms.delivery == proto::ns::Delivery::sync) most = service->terms.window;
   pace.window = pace.window == 0 ? most : std::min(pace.window, most);
-  const bool bounded = pace.window != 0 || pace.interval_us != 0 || service->terms.retain;
+  const bool bounded = pace.window != 0 || pace.interval_us != 0 || retains();
   if (!bounded && !once_paced.contains(subscriber)) return std::nullopt;
   return pace;
 }
@@ -97,7 +102,7 @@ Result<Services::Advertised, proto::Refusal> Services::advertise(NodeIndex provi
     effects.emplace_back(service_noted(ChangeKind::changed, entry));
   }
   if (!provided) node.provides.push_back({&entry, node.life});
-  return Advertised{entry.service->group, static_cast<std::uint32_t>(entry.subscribers.size())};
+  return Advertised{entry.service->group, entry.subscriber_count()};
 }
 
 std::optional<proto::Refusal> Services::withdraw(NodeIndex provider, GroupIndex group,
@@ -122,7 +127,8 @@ std::optional<proto::Refusal> Services::withdraw(NodeIndex provider, GroupIndex 
 Result<const Topic*, proto::Refusal> Services::subscribe(NodeIndex node_index,
                                                          std::string_view full_name,
                                                          const SubscriberTerms& terms,
-                                                         Effects& effects) {
+                                                         Effects& effects,
+                                                         const std::optional<AwayService>& away) {
   if (const char* fault = proto::name_fault(full_name)) return bad_name(fault);
   Node& node = nodes_[node_index];
   const auto known = topics_.find(full_name);
@@ -144,9 +150,17 @@ Result<const Topic*, proto::Refusal> Services::subscribe(NodeIndex node_index,
   if (terms != SubscriberTerms{}) entry.terms[node_index] = terms;
   if (entry.service) {
     entry.unused = 0;
-    effects.emplace_back(MemberChanged{entry.service->group, node_index});
+    effects.emplace_back(MemberChanged{make_id(hub_, entry.service->group), node_index});
     begin_pace(entry, node_index, effects);
     effects.emplace_back(SubscribersChanged{std::string{full_name}});
+    return &entry;
+  }
+  const bool first = away && !entry.away && !away_.contains(away->group);
+  if (first) begin_away(entry, *away, effects);
+  if (entry.away) {
+    if (!first) effects.emplace_back(AwayGroupChanged{entry.away->group});
+    effects.emplace_back(MemberChanged{entry.away->group, node_index});
+    begin_pace(entry, node_index, effects);
   }
   return &entry;
 }
@@ -226,8 +240,8 @@ void Services::node_renumbered(NodeIndex node_index, NodeIndex new_index, Effect
       if (changed->erase(node_index) != 0) changed->insert(new_index);
     }
     // It may not have joined the group yet, and be passed over now that it stands elsewhere.
-    if (!entry.service) continue;
-    effects.emplace_back(MemberChanged{entry.service->group, new_index});
+    if (!entry.group(hub_)) continue;
+    effects.emplace_back(MemberChanged{*entry.group(hub_), new_index});
     begin_pace(entry, new_index, effects);
   }
 }
@@ -240,6 +254,12 @@ void Services::node_left(NodeIndex node_index, milliseconds now, Effects& effect
 const Topic* Services::find_group(GroupIndex group) const {
   const auto found = groups_.find(group);
   return found == groups_.end() ? nullptr : found->second;
+}
+
+const Topic* Services::find_group(GroupId group) const {
+  if (hub_of(group) == hub_) return find_group(group_index_of(group));
+  const auto found = away_.find(group);
+  return found == away_.end() ? nullptr : found->second;
 }
 
 const ServiceTerms* Services::provided(NodeIndex node, std::string_view full_name) const {
@@ -279,6 +299,7 @@ Topic& Services::topic(std::string_view full_name) {
 
 void Services::forget_if_unused(Topic& topic) {
   if (topic.service || !topic.subscribers.empty()) return;
+  if (topic.away) away_.erase(topic.away->group);
   topics_.erase(topics_.find(topic.full_name));
 }
 
@@ -295,10 +316,11 @@ void Services::change_terms(Topic& topic, NodeIndex subscriber, const Subscriber
   if (terms != SubscriberTerms{}) topic.terms[subscriber] = terms;
   if (before && !topic.pace_of(subscriber)) topic.once_paced.insert(subscriber);
   const std::optional<SubscriberTerms> after = topic.pace_of(subscriber);
+  if (topic.away) effects.emplace_back(AwayGroupChanged{topic.away->group});
   if (before == after) return;
   if (!before) {
     topic.once_plain.insert(subscriber);
-    effects.emplace_back(MemberChanged{topic.service->group, subscriber});
+    effects.emplace_back(MemberChanged{*topic.group(hub_), subscriber});
   }
   begin_pace(topic, subscriber, effects);
 }
@@ -316,9 +338,15 @@ void Services::remove_subscriber(Topic& topic, NodeIndex node, milliseconds now,
   const bool paced = topic.pace_of(node).has_value();
   forget_subscriber(topic, node);
   list.erase(place);
+  if (topic.away) {
+    effects.emplace_back(MemberChanged{topic.away->group, node});
+    if (paced) effects.emplace_back(PaceEnded{node, topic.away->group});
+    effects.emplace_back(AwayGroupChanged{topic.away->group});
+  }
   if (topic.service) {
-    effects.emplace_back(MemberChanged{topic.service->group, node});
-    if (paced) effects.emplace_back(PaceEnded{node, topic.service->group});
+    const GroupId group = make_id(hub_, topic.service->group);
+    effects.emplace_back(MemberChanged{group, node});
+    if (paced) effects.emplace_back(PaceEnded{node, group});
     effects.emplace_back(SubscribersChanged{std::string{topic.full_name}});
     note_if_unused(topic, now);
   }

@@ -40,10 +40,20 @@ struct Service {
 };
 inline constexpr NodeIndex kNobody{};
 
+/// A service of another hub that gives data, as far as its subscribers here are concerned.
+struct AwayService {
+  GroupId group;
+  NodeId provider;
+  std::uint32_t window = 0;  ///< n of sync(n); 0: another delivery
+  bool retain = false;
+  friend bool operator==(const AwayService&, const AwayService&) = default;
+};
+
 /// A full name that somebody provides, or waits for, or that still has a group id.
 struct Topic {
   std::string_view full_name;
-  std::optional<Service> service;                        ///< nothing: no group id
+  std::optional<Service> service;                        ///< nothing: no group id here
+  std::optional<AwayService> away;                       ///< only without `service`
   std::vector<NodeIndex> subscribers;                    ///< ascending
   std::unordered_map<NodeIndex, SubscriberTerms> terms;  ///< of those that asked for something
   /// Subscribers that changed their terms in this group: that got everything and are paced now; and
@@ -54,8 +64,18 @@ struct Topic {
   std::uint64_t change = 0;  ///< number of the last one that subscribers were told; 0: none
   std::uint64_t orphan = 0;  ///< since when, in order, nobody provides the group; 0: somebody does
   std::uint64_t unused = 0;  ///< since when nobody has subscribed either; 0: it is used
+  std::uint32_t links = 0;   ///< that lead to subscribers at other hubs
 
   [[nodiscard]] bool provided() const { return service && service->provider != kNobody; }
+  /// Whose messages subscribers get, from this hub or another one; nothing: no group.
+  [[nodiscard]] std::optional<GroupId> group(HubId own) const;
+  [[nodiscard]] bool retains() const {
+    return service ? service->terms.retain : away && away->retain;
+  }
+  /// As the provider counts them: a link is one.
+  [[nodiscard]] std::uint32_t subscriber_count() const {
+    return static_cast<std::uint32_t>(subscribers.size()) + links;
+  }
   /// What the shards hold that subscriber to; nothing if it simply gets everything.
   [[nodiscard]] std::optional<SubscriberTerms> pace_of(NodeIndex subscriber) const;
   /// In force; 0: the subscriber's messages are not counted.
@@ -93,12 +113,11 @@ class Services {
   [[nodiscard]] std::optional<proto::Refusal> withdraw(NodeIndex provider, GroupIndex group,
                                                        std::chrono::milliseconds now,
                                                        Effects& effects);
-  /// The topic, with or without a service yet. Terms that say nothing: all that comes. Errors:
-  /// bad_request, limit.
-  [[nodiscard]] Result<const Topic*, proto::Refusal> subscribe(NodeIndex node_index,
-                                                               std::string_view full_name,
-                                                               const SubscriberTerms& terms,
-                                                               Effects& effects);
+  /// The topic, with or without a service yet. Terms that say nothing: all that comes. `away`: who
+  /// has it, if nobody here. Errors: bad_request, limit.
+  [[nodiscard]] Result<const Topic*, proto::Refusal> subscribe(
+      NodeIndex node_index, std::string_view full_name, const SubscriberTerms& terms,
+      Effects& effects, const std::optional<AwayService>& away = {});
   /// Errors: not_found. nullopt: done.
   [[nodiscard]] std::optional<proto::Refusal> unsubscribe(NodeIndex node_index,
                                                           std::string_view full_name,
@@ -125,10 +144,11 @@ class Services {
   }
 
   /// Another hub has a service of that name, another one than before, or none any more: those here
-  /// that subscribed to it are told.
-  void note_moved(std::string_view full_name, Effects& effects);
-  /// The same of all services that nobody here provides.
-  void note_all_moved(Effects& effects);
+  /// that subscribed to it are told, and get its messages. `away`: if it gives data.
+  void note_moved(std::string_view full_name, const std::optional<AwayService>& away,
+                  std::chrono::milliseconds now, Effects& effects);
+  /// So many links lead to subscribers of that group of this hub.
+  void set_links(GroupIndex group, std::uint32_t links, Effects& effects);
 
   /// Grows with each ServiceMoved.
   [[nodiscard]] std::uint64_t changes() const { return changes_; }
@@ -140,6 +160,8 @@ class Services {
   [[nodiscard]] const Topic* find(std::string_view full_name) const;
   /// nullptr: no such group.
   [[nodiscard]] const Topic* find_group(GroupIndex group) const;
+  /// The same of this hub or another one, which somebody here has subscribed to.
+  [[nodiscard]] const Topic* find_group(GroupId group) const;
   /// Topics with a group, by ascending group index; some are provided by nobody.
   [[nodiscard]] const std::map<GroupIndex, Topic*>& groups() const { return groups_; }
   /// Services that somebody provides.
@@ -186,6 +208,8 @@ class Services {
                                                      Effects& effects);
   void enter_group(Topic& topic, const Service& service, std::chrono::milliseconds now,
                    Effects& effects);
+  void begin_away(Topic& topic, const AwayService& away, Effects& effects);
+  void end_away(Topic& topic, Effects& effects);
   void take_over(Topic& topic, NodeIndex provider, const ServiceTerms& terms, Effects& effects);
   void end_provision(Topic& topic, std::chrono::milliseconds now, Effects& effects);
   void leave_group(Topic& topic, std::chrono::milliseconds now, Effects& effects);
@@ -193,7 +217,7 @@ class Services {
   void note_use(Topic& topic);
   void note_if_unused(Topic& topic, std::chrono::milliseconds now);
   [[nodiscard]] bool is_void(const Unused& note) const;
-  static void begin_pace(const Topic& topic, NodeIndex subscriber, Effects& effects);
+  void begin_pace(const Topic& topic, NodeIndex subscriber, Effects& effects) const;
   static void forget_subscriber(Topic& topic, NodeIndex subscriber);
   void change_terms(Topic& topic, NodeIndex subscriber, const SubscriberTerms& terms,
                     Effects& effects);
@@ -207,6 +231,7 @@ class Services {
   IndexPool group_indices_;
   Topics topics_;
   std::map<GroupIndex, Topic*> groups_;
+  std::map<GroupId, Topic*> away_;           ///< of other hubs
   std::map<std::uint64_t, Topic*> orphans_;  ///< by Topic::orphan: the oldest first
   DueList<Unused> unused_;
   std::unordered_map<NodeIndex, Node> nodes_;

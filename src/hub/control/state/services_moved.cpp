@@ -28,6 +28,7 @@ std::optional<GroupIndex> Services::take_group(milliseconds now, Effects& effect
 void Services::enter_group(Topic& topic, const Service& service, milliseconds now,
                            Effects& effects) {
   const std::optional<Service> former = topic.service;
+  if (topic.away) end_away(topic, effects);
   if (topic.provided()) effects.emplace_back(service_noted(ChangeKind::withdrawn, topic));
   if (former) leave_group(topic, now, effects);
   if (former && former->terms.retain && former->provider != kNobody)
@@ -38,6 +39,25 @@ void Services::enter_group(Topic& topic, const Service& service, milliseconds no
   effects.emplace_back(GroupChanged{service.group});
   tell_subscribers(topic, effects, true);
   effects.emplace_back(service_noted(ChangeKind::advertised, topic));
+}
+
+/// Its subscribers get the messages of a group of another hub.
+void Services::begin_away(Topic& topic, const AwayService& away, Effects& effects) {
+  topic.away = away;
+  away_[away.group] = &topic;
+  effects.emplace_back(AwayGroupChanged{away.group});
+}
+
+void Services::end_away(Topic& topic, Effects& effects) {
+  const GroupId group = topic.away->group;
+  for (const NodeIndex subscriber : topic.subscribers) {
+    if (topic.pace_of(subscriber)) effects.emplace_back(PaceEnded{subscriber, group});
+  }
+  topic.once_plain.clear();
+  topic.once_paced.clear();
+  topic.away.reset();
+  away_.erase(group);
+  effects.emplace_back(AwayGroupChanged{group});
 }
 
 /// Somebody provides what nobody did.
@@ -70,11 +90,13 @@ void Services::leave_group(Topic& topic, milliseconds now, Effects& effects) {
   const GroupIndex group = topic.service->group;
   note_use(topic);
   for (const NodeIndex subscriber : topic.subscribers) {
-    if (topic.pace_of(subscriber)) effects.emplace_back(PaceEnded{subscriber, group});
+    if (topic.pace_of(subscriber))
+      effects.emplace_back(PaceEnded{subscriber, make_id(hub_, group)});
   }
   topic.once_plain.clear();
   topic.once_paced.clear();
   topic.service.reset();
+  topic.links = 0;
   groups_.erase(group);
   group_indices_.give_back(group.value(), now);
   effects.emplace_back(GroupChanged{group});
@@ -114,8 +136,8 @@ std::optional<milliseconds> Services::next_deadline() const {
   return unused_.empty() ? std::nullopt : std::optional{unused_.front().until};
 }
 
-void Services::begin_pace(const Topic& topic, NodeIndex subscriber, Effects& effects) {
-  if (topic.pace_of(subscriber)) effects.emplace_back(PaceDue{subscriber, topic.service->group});
+void Services::begin_pace(const Topic& topic, NodeIndex subscriber, Effects& effects) const {
+  if (topic.pace_of(subscriber)) effects.emplace_back(PaceDue{subscriber, *topic.group(hub_)});
 }
 
 void Services::tell_subscribers(Topic& topic, Effects& effects, bool joins) {
@@ -124,15 +146,37 @@ void Services::tell_subscribers(Topic& topic, Effects& effects, bool joins) {
   effects.emplace_back(ServiceMoved{std::string{topic.full_name}, joins});
 }
 
-void Services::note_moved(std::string_view full_name, Effects& effects) {
+/// Another hub's service replaces a group of this hub that nobody provides. A group id that two
+/// names claim belongs to the first one.
+void Services::note_moved(std::string_view full_name, const std::optional<AwayService>& away,
+                          milliseconds now, Effects& effects) {
   const auto found = topics_.find(full_name);
-  if (found != topics_.end() && !found->second.provided()) tell_subscribers(found->second, effects);
+  if (found == topics_.end() || found->second.provided()) return;
+  Topic& topic = found->second;
+  if (topic.subscribers.empty()) return;
+  const auto held = away ? away_.find(away->group) : away_.end();
+  const bool usable = away && (held == away_.end() || held->second == &topic);
+  const auto same_stream = [&] {
+    return away->group == topic.away->group && away->window == topic.away->window &&
+           away->retain == topic.away->retain;
+  };
+  if (topic.away && usable && same_stream()) {
+    topic.away = away;
+    effects.emplace_back(AwayGroupChanged{away->group});
+    return tell_subscribers(topic, effects);
+  }
+  if (topic.away) end_away(topic, effects);
+  if (!usable) return tell_subscribers(topic, effects);
+  if (topic.service) leave_group(topic, now, effects);
+  begin_away(topic, *away, effects);
+  tell_subscribers(topic, effects, true);
 }
 
-void Services::note_all_moved(Effects& effects) {
-  for (auto& [name, topic] : topics_) {
-    if (!topic.provided()) tell_subscribers(topic, effects);
-  }
+void Services::set_links(GroupIndex group, std::uint32_t links, Effects& effects) {
+  const auto found = groups_.find(group);
+  if (found == groups_.end() || found->second->links == links) return;
+  found->second->links = links;
+  effects.emplace_back(SubscribersChanged{std::string{found->second->full_name}});
 }
 
 std::vector<const Topic*> Services::moved_since(NodeIndex node, std::uint64_t change) const {

@@ -46,7 +46,7 @@ class PacedBook final : public CountedGroups {
 
   [[nodiscard]] bool counts(GroupId group) const override {
     const PacedSubscription* found = find(group);
-    return found != nullptr && found->terms().window != 0;
+    return found != nullptr && found->terms().window != 0 && !found->by_queue;
   }
   void on_lost(GroupId group, std::uint32_t messages) override {
     PacedSubscription* found = find(group);

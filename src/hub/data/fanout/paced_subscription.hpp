@@ -101,6 +101,7 @@ class PacedSubscription {
   std::uint32_t start_ticket = 0;
   bool awaits_start = false;
   bool retained = false;   ///< of a service whose last message is kept
+  bool by_queue = false;   ///< of a link: what waits in its outbox counts, and no CREDIT comes
   bool ripe = false;       ///< is in the pacer's list of those that may have room
   bool scheduled = false;  ///< is in the pacer's list of those that wait for their time, once
 

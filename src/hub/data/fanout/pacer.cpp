@@ -57,6 +57,7 @@ PacedSubscription* Pacer::find(const Recipient& recipient, GroupId group) {
 bool Pacer::offer(PacedSubscription& subscription, const Run& run, const proto::FrameHeader& header,
                   Handover handover) {
   if (subscription.awaits_start) return false;
+  look_at_queue(subscription);
   follow_source(subscription, NodeId{header.src});
   const Recipient& recipient = subscription.recipient();
   if (!recipient.connected && !recipient.waits_when_away) {
@@ -64,8 +65,7 @@ bool Pacer::offer(PacedSubscription& subscription, const Run& run, const proto::
   } else if (header.has(proto::kFlagFragment)) {
     give_up_stalled(subscription);
     offer_fragment(subscription, run, header, handover);
-    // A message that was given up made room.
-    release(subscription);
+    release(subscription);  // a message that was given up made room
   } else {
     give_up_stalled(subscription);
     Open& open = subscription.open(header.lane & proto::kLaneMask);

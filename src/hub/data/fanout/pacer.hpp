@@ -41,6 +41,12 @@ class Pacer {
   /// or the total cannot be. Of former counts it changes nothing.
   [[nodiscard]] bool on_credit(const Recipient& recipient, const proto::flow::Credit& credit);
 
+  /// Something of the outbox of a link was written. REQUIRES: recipient.paced.
+  void on_written(Recipient& recipient) {
+    recipient.paced->for_each([&](PacedSubscription& each) {
+      if (look_at_queue(each)) release(each);
+    });
+  }
   /// The recipient's counts begin anew; what still waits in its outbox will be written.
   void on_new_epoch(Recipient& recipient);
   /// The recipient lost its connection, and nothing waits for it.
@@ -65,6 +71,13 @@ class Pacer {
   void offer_fragment(PacedSubscription& subscription, const Run& run,
                       const proto::FrameHeader& header, Handover handover);
   void begin_plain(PacedSubscription& subscription) const;
+  /// A link's window that is full is full of what its outbox has not written. True: it was.
+  static bool look_at_queue(PacedSubscription& subscription) {
+    if (!subscription.by_queue || subscription.space() != 0) return false;
+    Outbox& outbox = subscription.recipient().outbox;
+    subscription.begin_counts(subscription.number(), outbox.waiting_messages(subscription.group()));
+    return true;
+  }
   void follow_source(PacedSubscription& subscription, NodeId source);
   void give_up_stalled(PacedSubscription& subscription);
   void begin_message(PacedSubscription& subscription, Open& open, std::uint32_t number);

@@ -265,7 +265,7 @@ void RetainedMessages::hand(const GroupStart& start, const KeptMessage& message)
 }
 
 void RetainedMessages::ask_start(PacedSubscription& subscription) {
-  const GroupMembers* members = groups_.find(index_of(subscription.group()));
+  const GroupMembers* members = groups_.find(subscription.group());
   subscription.start_ticket = ++starts_;
   // Nothing is kept of a group that nobody provides.
   subscription.awaits_start = members != nullptr && members->provided();
@@ -287,7 +287,7 @@ PacedSubscription* RetainedMessages::subscription_of(const GroupStart& start) co
 }
 
 bool RetainedMessages::is_of_another(const GroupStart& start) const {
-  const GroupMembers* members = groups_.find(index_of(start.group));
+  const GroupMembers* members = groups_.find(start.group);
   return members != nullptr && members->provided() && members->provider != start.provider;
 }
 

@@ -19,7 +19,7 @@ std::uint32_t ShardRecipients::count(ShardIndex shard, const std::byte* frame) c
 }
 
 std::uint32_t ShardRecipients::count_members(ShardIndex shard, GroupId group) const {
-  const GroupMembers* members = groups_.find(index_of(group));
+  const GroupMembers* members = groups_.find(group);
   if (members == nullptr) return 0;
   std::size_t there = members->by_shard[shard.value()].size();
   if (!members->paced_by_shard.empty()) there += members->paced_by_shard[shard.value()].size();

@@ -111,23 +111,43 @@ proto::DropReason Router::why_absent(NodeId node) const {
   return returns ? proto::DropReason::away : proto::DropReason::no_such_node;
 }
 
-const GroupMembers* Router::find_group(const Run& run, const proto::FrameHeader& header) {
+/// A frame of a group of another hub comes over the link that this hub joined the group on, from a
+/// node of that hub. Whoever provides the group was looked at there: the names of a new provider
+/// may come later than its frames. A link's frame that is too late is nobody's loss: its sender is
+/// not told.
+const GroupMembers* Router::find_away_group(const Run& run, const proto::FrameHeader& header,
+                                            Arrival arrival) {
   const GroupId group{header.dst};
-  if (hub_of(group) != hub_) {
-    drop(run, proto::DropReason::no_route);
+  const GroupMembers* members = groups_.find_away(group);
+  if (from_ == kOwnHub && !arrival.handed_over()) {
+    drop(run, members == nullptr ? proto::DropReason::no_route : proto::DropReason::not_allowed);
     return nullptr;
   }
+  const bool right_way = arrival.handed_over() || members == nullptr || members->parent == from_;
+  if (members != nullptr && right_way && hub_of(NodeId{header.src}) == hub_of(group))
+    return members;
+  const auto reason =
+      members == nullptr ? proto::DropReason::no_subscriber : proto::DropReason::wrong_way;
+  fanout_.context().tally.drop(reason, run.frames);
+  return nullptr;
+}
+
+const GroupMembers* Router::find_group(const Run& run, const proto::FrameHeader& header,
+                                       Arrival arrival) {
+  const GroupId group{header.dst};
+  if (hub_of(group) != hub_) return find_away_group(run, header, arrival);
   const GroupMembers* members = groups_.find(index_of(group));
   if (members == nullptr) drop(run, proto::DropReason::no_such_group);
   return members;
 }
 
 void Router::to_group(const Run& run, const proto::FrameHeader& header, Arrival arrival) {
-  const GroupMembers* members = find_group(run, header);
+  const GroupMembers* members = find_group(run, header, arrival);
   if (members == nullptr) return;
   // Looked at for each run on every shard: no subscriber gets a former provider's frame after one
   // of the next. The last frames of one that left are delivered while nobody provides the group.
-  if (members->provider != NodeId{header.src} && (members->provided() || !arrival.handed_over())) {
+  if (members->provider != NodeId{header.src} && members->parent == kOwnHub &&
+      (members->provided() || !arrival.handed_over())) {
     return drop(run, members->provided() ? proto::DropReason::not_allowed
                                          : proto::DropReason::no_such_group);
   }
@@ -199,7 +219,7 @@ void Router::to_other_shards(const Run& run, std::uint64_t shards, std::size_t d
 void Router::to_provider(const Run& run, const proto::FrameHeader& header, Arrival arrival) {
   const HubId owner = hub_of(GroupId{header.dst});
   if (owner != hub_) return to_hub(run, header, owner, arrival);
-  const GroupMembers* members = find_group(run, header);
+  const GroupMembers* members = find_group(run, header, arrival);
   if (members == nullptr) return;
   if (!members->provided()) return drop(run, proto::DropReason::no_such_group);
   if (!members->accepts) return drop(run, proto::DropReason::not_allowed);

@@ -118,7 +118,12 @@ class Router {
   void to_other_shards(const Run& run, std::uint64_t shards, std::size_t deliveries,
                        std::uint32_t& outcomes);
   [[nodiscard]] std::uint32_t to_members_elsewhere(const Run& run, const GroupMembers& members);
-  [[nodiscard]] const GroupMembers* find_group(const Run& run, const proto::FrameHeader& header);
+  /// nullptr: the run was dropped.
+  [[nodiscard]] const GroupMembers* find_group(const Run& run, const proto::FrameHeader& header,
+                                               Arrival arrival);
+  [[nodiscard]] const GroupMembers* find_away_group(const Run& run,
+                                                    const proto::FrameHeader& header,
+                                                    Arrival arrival);
   /// REQUIRES: no session has that id.
   [[nodiscard]] proto::DropReason why_absent(NodeId node) const;
   void drop(const Run& run, proto::DropReason reason);

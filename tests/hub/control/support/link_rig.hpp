@@ -28,7 +28,7 @@ struct LinkRig {
   LinkRig(std::uint16_t id, LinksOptions options, std::uint64_t instance = 0)
       : facts(facts_of(id, instance)),
         links(std::move(options),
-              {facts, limits, shards, slots, routes, names,
+              {facts, limits, shards, slots, routes, names, groups,
                [this](LinkNumber link, const DialledLink&, const proto::Hello& hello) {
                  dialled.push_back({link, hello});
                },
@@ -102,6 +102,11 @@ struct LinkRig {
   Membership membership{Sessions::Options{facts.id, 1, Placement::spread}, limits};
   Watches watches{HubTitle{facts.id, facts.name}, 1, limits};
   NetworkNames names{{facts, limits, membership, watches}};
+  NodeTable node_table;
+  GroupTable group_table;
+  Quiescence quiescence{1};
+  TablePublisher publisher{facts.id, 1, {node_table, group_table, quiescence}};
+  GroupLinks groups{{facts, limits, shards, membership, publisher, names}};
   std::vector<Dialled> dialled;
   std::chrono::milliseconds now{10'000};
   std::int64_t clock_ahead_ns = 0;

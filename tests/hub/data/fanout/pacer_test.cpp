@@ -46,6 +46,21 @@ TEST_F(PacerTest, HoldsTheNewestOfItsDepthInOrder) {
   EXPECT_THAT(sent(), ElementsAre("8")) << "a larger window opens at once";
 }
 
+TEST_F(PacerTest, TheWindowOfALinkIsWhatWaitsInItsQueue) {
+  PacedSubscription& one = subscribe({.window = 2});
+  one.by_queue = true;
+  offer(one, {"1", "2", "3", "4"});
+  rig.pacer.on_written(recipient);
+  EXPECT_THAT(sent(), ElementsAre("1", "2")) << "nothing was written before";
+  rig.pacer.on_written(recipient);
+  EXPECT_THAT(sent(), ElementsAre("4")) << "the newest follows";
+  offer(one, {"5"});
+  EXPECT_THAT(sent(), ElementsAre("5"));
+  offer(one, {"6", "7"});
+  EXPECT_THAT(sent(), ElementsAre("6", "7")) << "those before were written: nobody credits them";
+  EXPECT_EQ(dropped(DropReason::replaced), 1u);
+}
+
 TEST_F(PacerTest, GivesTheNewestAtEachDueTime) {
   PacedSubscription& one = subscribe({.interval_us = 20'000});
   offer(one, {"1"});

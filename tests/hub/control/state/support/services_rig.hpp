@@ -46,17 +46,17 @@ inline std::vector<std::string> words(const Effects& effects, const Services& se
       result.push_back("group " + std::to_string(group->index.value()));
     } else if (const auto* member = std::get_if<MemberChanged>(&effect)) {
       result.push_back("member " + std::to_string(member->subscriber.value()) + " of " +
-                       std::to_string(member->group.value()));
+                       std::to_string(index_of(member->group)));
     } else if (const auto* moved = std::get_if<ServiceMoved>(&effect)) {
       result.push_back("moved " + moved->full_name + (moved->joins ? ", joins" : ""));
     } else if (const auto* change = std::get_if<SubscribersChanged>(&effect)) {
       result.push_back("subscribers " + change->full_name);
     } else if (const auto* pace = std::get_if<PaceDue>(&effect)) {
       result.push_back("pace " + std::to_string(pace->subscriber.value()) + " of " +
-                       std::to_string(pace->group.value()) + ": " + pace_text(services, *pace));
+                       std::to_string(index_of(pace->group)) + ": " + pace_text(services, *pace));
     } else if (const auto* ended = std::get_if<PaceEnded>(&effect)) {
       result.push_back("no pace " + std::to_string(ended->subscriber.value()) + " of " +
-                       std::to_string(ended->group.value()));
+                       std::to_string(index_of(ended->group)));
     } else if (const auto* forgotten = std::get_if<RetainedDropped>(&effect)) {
       result.push_back("forget " + std::to_string(forgotten->group.value()) + " of " +
                        std::to_string(forgotten->provider.value()));

@@ -1,0 +1,197 @@
+#!/usr/bin/env python3
+"""Services across linked hubs: a provider at one end of a chain of three, subscribers at the others."""
+
+import json
+import unittest
+
+from stranger_parts.bitestream import BOOL, F64, TEXT, U32, every, fields, put
+from stranger_parts.case import PATIENT, Case
+from stranger_parts.client import CTRL, GROUP, NS
+from support.processes import run_gimnet
+from support.waiting import wait_until
+
+SERVICE_MOVED, SUBSCRIBERS = 32, 33
+
+
+class Chain(Case):
+    """Hub 1 - hub 2 - hub 3."""
+
+    def setUp(self):
+        self.first = self.hub("--accept-links", *PATIENT, hub_id=1)
+        self.middle = self.hub("--accept-links", "--link", self.first.url, *PATIENT, hub_id=2)
+        self.last = self.hub("--link", self.middle.url, *PATIENT, hub_id=3)
+        self.robot = self.stranger(self.first, "robot")
+
+    def known(self, who, name, provided=True):
+        """Waits until that hub has heard of the service."""
+        def ask():
+            return any(fields(service)[2] == name for service in every(who.ask(NS, 9), 3))
+        wait_until(lambda: ask() == provided, f"{name} is known")
+
+    def viewer(self, hub, name, service="robot/scan", more=b""):
+        made = self.stranger(hub, name)
+        self.known(made, service)
+        made.state = made.subscribe(service, more)
+        return made
+
+    def publish(self, group, body, **how):
+        self.robot.write(GROUP, group, body, **how)
+
+    def until_subscribed(self, group, count=1):
+        """The provider has heard of so many subscribers."""
+        heard = {}
+        while (heard.get(3), heard.get(4)) != (group, count):
+            heard = self.robot.event(SUBSCRIBERS)
+
+    def links(self, hub):
+        return {link["hub"]: link for link in json.loads(run_gimnet(hub, "links", "--json").out)}
+
+    def exact(self):
+        def all_exact():
+            return json.loads(run_gimnet(self.first, "status", "--all", "--json").out)["exact"]
+        wait_until(all_exact, "the ledgers agree")
+
+
+class Groups(Chain):
+    def test_messages_reach_subscribers_at_all_hubs_once(self):
+        group = self.robot.advertise("scan")[3]
+        viewers = [self.viewer(self.last, "a"), self.viewer(self.last, "b"), self.viewer(self.middle, "c"),
+                   self.viewer(self.first, "d")]
+        self.assertEqual([viewer.state[4] for viewer in viewers], [group] * 4)
+        self.assertEqual([viewer.state[5] for viewer in viewers], [self.robot.id] * 4)
+        for number in range(5):
+            self.publish(group, bytes([number]))
+        for viewer in viewers:
+            got = [viewer.data(GROUP) for _ in range(5)]
+            self.assertEqual([each.body for each in got], [bytes([number]) for number in range(5)])
+            self.assertEqual({(each.src, each.dst) for each in got}, {(self.robot.id, group)})
+        self.assertEqual(viewers[0].taken, 5)
+        self.exact()
+
+    def test_the_provider_counts_a_link_as_one_subscriber(self):
+        self.robot.advertise("scan")
+        for name in "ab":
+            self.viewer(self.last, name)
+        self.assertEqual(self.robot.event(SUBSCRIBERS)[4], 1)
+        self.stranger(self.first, "c").subscribe("robot/scan")
+        self.assertEqual(self.robot.event(SUBSCRIBERS)[4], 2)
+
+    def test_a_subscriber_that_was_there_before_the_service(self):
+        viewer = self.stranger(self.last, "viewer")
+        self.assertEqual(viewer.subscribe("robot/scan")[4], 0)
+        group = self.robot.advertise("scan")[3]
+        moved = viewer.event(SERVICE_MOVED)
+        self.assertEqual((moved[3], moved[4]), ("robot/scan", group))
+        self.until_subscribed(group)
+        self.publish(group, b"first")
+        self.assertEqual(viewer.data(GROUP).body, b"first")
+
+    def test_the_last_message_is_for_new_subscribers_at_any_hub(self):
+        group = self.robot.advertise("scan", retain=put(11, BOOL, True))[3]
+        self.publish(group, b"old")
+        self.publish(group, b"kept")
+        for hub, name in ((self.last, "a"), (self.last, "b"), (self.middle, "c"), (self.first, "d")):
+            self.assertEqual(self.viewer(hub, name).data(GROUP).body, b"kept", name)
+
+    def test_a_link_carries_what_those_behind_it_want(self):
+        group = self.robot.advertise("scan")[3]
+        slow = self.viewer(self.last, "slow", more=put(6, F64, 1.0))
+        before = self.links(self.first)[2]["sent_bytes"]
+        for number in range(100):
+            self.publish(group, bytes([number]) * 1000)
+        self.assertEqual(slow.data(GROUP).body, bytes([0]) * 1000)
+        self.assertEqual(slow.data(GROUP).body, bytes([99]) * 1000, "the newest one, a second later")
+        self.assertLess(self.links(self.first)[2]["sent_bytes"] - before, 50_000)
+        fast = self.viewer(self.last, "fast")
+        wait_until(lambda: self.stream_through(group, fast), "everything comes again")
+
+    def stream_through(self, group, fast):
+        """Do ten messages in one go all come?"""
+        for number in range(10):
+            self.publish(group, bytes([number]))
+        return fast.data(GROUP).body == b"\0" and [fast.data(GROUP).body for _ in range(9)] == [bytes([n]) for n in range(1, 10)]
+
+    def test_bytes_on_a_link_are_the_same_for_one_and_for_many_subscribers(self):
+        group = self.robot.advertise("scan")[3]
+
+        def bytes_of_twenty(viewer):
+            before = self.links(self.first)[2]["sent_bytes"]
+            for _ in range(20):
+                self.publish(group, bytes(5000))
+            for _ in range(20):
+                viewer.data(GROUP)
+            return self.links(self.first)[2]["sent_bytes"] - before
+
+        viewer = self.viewer(self.last, "viewer")
+        of_one = bytes_of_twenty(viewer)
+        for number in range(25):
+            self.stranger(self.last, f"more-{number}").subscribe("robot/scan")
+        # Signs of life of the link come between: less than half a message.
+        self.assertLess(abs(bytes_of_twenty(viewer) - of_one), 2500)
+
+    def test_a_service_moves_to_another_group(self):
+        group = self.robot.advertise("scan")[3]
+        viewer = self.viewer(self.last, "viewer")
+        other = self.robot.advertise("scan", type=put(4, U32, 77))[3]
+        self.assertNotEqual(group, other)
+        moved = viewer.event(SERVICE_MOVED)
+        self.assertEqual(moved[4], other)
+        self.until_subscribed(other)
+        self.publish(other, b"new")
+        self.assertEqual(viewer.data(GROUP).body, b"new")
+
+    def test_the_owner_starts_again(self):
+        group = self.robot.advertise("scan")[3]
+        viewer = self.viewer(self.last, "viewer")
+        self.publish(group, b"before")
+        self.assertEqual(viewer.data(GROUP).body, b"before")
+        self.first.process.end()
+        self.first = self.first.again(self)
+        self.robot = self.stranger(self.first, "robot")
+        group = self.robot.advertise("scan")[3]
+        self.until_subscribed(group)
+        self.publish(group, b"after")
+        self.assertEqual(viewer.data(GROUP).body, b"after")
+
+
+class Ring(Case):
+    """Four hubs in a ring, and a link across it."""
+
+    def setUp(self):
+        first = self.hub("--accept-links", *PATIENT, hub_id=1)
+        second = self.hub("--accept-links", "--link", first.url, *PATIENT, hub_id=2)
+        third = self.hub("--accept-links", "--link", second.url, "--link", first.url, *PATIENT, hub_id=3)
+        fourth = self.hub("--link", third.url, "--link", first.url, *PATIENT, hub_id=4)
+        self.hubs = [first, second, third, fourth]
+        self.nodes = [self.stranger(hub, f"node-{hub_id}") for hub_id, hub in enumerate(self.hubs, 1)]
+
+        def all_links():
+            shown = run_gimnet(first, "graph", "--json")
+            edges = json.loads(shown.out)["links"]
+            return len(edges) == 5 and all(edge["agreed"] for edge in edges)
+        wait_until(all_links, "all links")
+
+    def test_a_group_crosses_each_link_once_and_finds_another_way(self):
+        group = self.nodes[0].advertise("scan")[3]
+        for node in self.nodes[1:]:
+            wait_until(lambda: any(fields(s)[2] == "node-1/scan" for s in every(node.ask(NS, 9), 3)), "known")
+            node.subscribe("node-1/scan")
+        for number in range(5):
+            self.nodes[0].write(GROUP, group, bytes([number]))
+        for node in self.nodes[1:]:
+            self.assertEqual([node.data(GROUP).body for _ in range(5)], [bytes([number]) for number in range(5)])
+            self.assertEqual(node.taken, 5)
+        # Hub 4 loses its link to hub 1, and hears the group from hub 3.
+        hub = self.connected(self.hubs[3], local=True).join(role=2)
+        names = [link["name"] for link in json.loads(run_gimnet(self.hubs[3], "links", "--json").out) if link["hub"] == 1]
+        hub.ask(CTRL, 12, put(3, TEXT, names[0]))
+
+        def comes():
+            self.nodes[0].write(GROUP, group, b"again")
+            self.nodes[3].ping()
+            return any(got.body == b"again" for got in self.nodes[3].waiting)
+        wait_until(comes, "it comes another way")
+
+
+if __name__ == "__main__":
+    unittest.main()
