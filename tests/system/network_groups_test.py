@@ -6,11 +6,12 @@ import unittest
 
 from stranger_parts.bitestream import BOOL, F64, TEXT, U32, every, fields, put
 from stranger_parts.case import PATIENT, Case
-from stranger_parts.client import CTRL, GROUP, NS
+from stranger_parts.client import BROADCAST, CTRL, GROUP, NS, UNICAST
 from support.processes import run_gimnet
 from support.waiting import wait_until
 
 SERVICE_MOVED, SUBSCRIBERS = 32, 33
+EVERYBODY = 0xFFFFFFFF
 
 
 class Chain(Case):
@@ -170,6 +171,23 @@ class Ring(Case):
             edges = json.loads(shown.out)["links"]
             return len(edges) == 5 and all(edge["agreed"] for edge in edges)
         wait_until(all_links, "all links")
+
+    def test_a_broadcast_reaches_each_node_once(self):
+        for sender in self.nodes:
+            for number in range(3):
+                sender.write(BROADCAST, EVERYBODY, bytes([number]))
+        for node in self.nodes:
+            got = [node.data(BROADCAST) for _ in range(9)]
+            expected = {(each.id, bytes([n])) for each in self.nodes if each is not node for n in range(3)}
+            self.assertEqual({(each.src, each.body) for each in got}, expected)
+            node.ping()
+            self.assertEqual(node.taken, 9)
+
+    def test_a_broadcast_to_one_hub_reaches_its_nodes_alone(self):
+        self.nodes[0].write(BROADCAST, 3 << 20 | 0xFFFFF, b"third")
+        self.assertEqual(self.nodes[2].data(BROADCAST).body, b"third")
+        self.nodes[2].write(UNICAST, self.nodes[1].id, b"next")
+        self.assertEqual(self.nodes[1].data().body, b"next")
 
     def test_a_group_crosses_each_link_once_and_finds_another_way(self):
         group = self.nodes[0].advertise("scan")[3]

@@ -20,13 +20,16 @@ class NextHops {
   /// link, none if no shard has it.
   template <class PlaceOf>
   void publish(const std::array<LinkNumber, NetworkMap::kHubIds>& links, PlaceOf&& place_of) {
+    std::uint64_t shards = 0;
     for (std::size_t hub = 0; hub < links.size(); ++hub) {
       if (links[hub] == LinkNumber{} && !published_[hub].exists()) continue;
       const NextHop next = links[hub] == LinkNumber{} ? NextHop{} : place_of(links[hub]);
+      if (next.exists()) shards |= std::uint64_t{1} << next.link.shard.value();
       if (next == published_[hub]) continue;
       published_[hub] = next;
       routes_.publish(HubId{static_cast<std::uint16_t>(hub)}, next);
     }
+    routes_.publish_shards(shards);
   }
 
   [[nodiscard]] const NextHop& find(HubId hub) const {

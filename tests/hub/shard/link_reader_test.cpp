@@ -325,6 +325,47 @@ TEST(LinkReader, AGroupOfAnotherHubComesFromTheParentAlone) {
   }
 }
 
+TEST(LinkReader, ABroadcastGoesOnAlongTheShortestWaysOnce) {
+  constexpr std::uint32_t kAll = make_id<NodeId>(kEveryHub, kEveryIndex).value();
+  for (const std::size_t shard : {0u, 1u}) {
+    HubRig rig(2);
+    FakeNode& node = rig.join(0);
+    FakeNode& near = rig.link(0, kNear);
+    FakeNode& far = rig.link(shard, kFar);
+    FakeNode& spare = rig.link(1, HubId{40});
+    // The way to hub 40 is over another link: it hears from there.
+    rig.routes().publish(HubId{40}, rig.routes().find(kFar));
+    rig.routes().publish_shards(3);
+    rig.write(near, frame_after(0, kAll, "all", {.kind = Kind::broadcast}));
+    rig.write(far, frame_after(3, kAll, "all", {.kind = Kind::broadcast}));
+    rig.settle();
+    EXPECT_THAT(node.texts(), ElementsAre("all"));
+    EXPECT_THAT(far.texts(), ElementsAre("all"));
+    EXPECT_THAT(near.texts(), IsEmpty()) << "it came from there";
+    EXPECT_THAT(spare.texts(), IsEmpty());
+    EXPECT_EQ(rig.dropped(DropReason::wrong_way), 1u);
+    rig.send(node, kAll, "mine", {.kind = Kind::broadcast});
+    rig.settle();
+    EXPECT_THAT(near.texts(), ElementsAre("mine"));
+    EXPECT_THAT(far.texts(), ElementsAre("all", "mine"));
+    EXPECT_TRUE(rig.ledger().exact());
+  }
+}
+
+TEST(LinkReader, ABroadcastToOneHubIsRouted) {
+  HubRig rig;
+  FakeNode& node = rig.join(0);
+  FakeNode& near = rig.link(0, kNear);
+  FakeNode& far = rig.link(0, kFar);
+  rig.routes().publish_shards(1);
+  const FrameSpec spec{.kind = Kind::broadcast};
+  rig.write(near, frame_after(0, make_id<NodeId>(kFar, kEveryIndex).value(), "there", spec));
+  rig.write(near, frame_after(0, make_id<NodeId>(HubId{7}, kEveryIndex).value(), "here", spec));
+  rig.settle();
+  EXPECT_THAT(far.texts(), ElementsAre("there"));
+  EXPECT_THAT(node.texts(), ElementsAre("here"));
+}
+
 TEST(LinkReader, WhatALinkDidNotConfirmIsUnsure) {
   HubRig rig;
   FakeNode& node = rig.join(0);

@@ -334,24 +334,40 @@ inline void Router::to_listed(const Run& frame, const proto::FrameHeader& header
   fanout_.deliver(*recipient, frame, header, Handover{.fan_out = true});
 }
 
+/// A BROADCAST to all hubs goes to each neighbour whose shortest way to the source begins with this
+/// hub, and each hub takes it from the first hub of its own shortest way. So every hub gets it once
+/// (docs/adr/0018-broadcast-along-shortest-ways.md).
 void Router::to_everybody(const Run& run, const proto::FrameHeader& header, Arrival arrival) {
   const NodeId dst{header.dst};
-  if (hub_of(dst) != hub_ && hub_of(dst) != kEveryHub)
-    return drop(run, proto::DropReason::no_route);
+  const bool to_all = hub_of(dst) == kEveryHub;
   if (index_of(dst) != kEveryIndex) return drop(run, proto::DropReason::no_such_node);
+  if (!to_all && hub_of(dst) != hub_) return to_hub(run, header, hub_of(dst), arrival);
+  const HubId source = hub_of(NodeId{header.src});
+  const HubId before = source == hub_ ? kOwnHub : routes_.find(source).neighbour;
+  if (to_all && !arrival.handed_over() && from_ != before)
+    return fanout_.context().tally.drop(proto::DropReason::wrong_way, run.frames);
   std::uint32_t outcomes = 0;
   const std::size_t slots = fanout_.recipients().by_slot().size();
   deliveries_ += slots;
   const Handover handover{.fan_out = true};
   for (Recipient* recipient : fanout_.recipients().by_slot()) {
-    if (recipient == nullptr || recipient->is_link() || recipient->node == NodeId{header.src})
-      continue;
+    if (recipient == nullptr || recipient->node == NodeId{header.src}) continue;
+    if (recipient->is_link() && !(to_all && carries_to(*recipient, before))) continue;
     fanout_.deliver(*recipient, run, header, handover);
     ++outcomes;
   }
   // Nodes are spread over the shards: there are about as many on each other one.
-  if (!arrival.handed_over()) to_other_shards(run, nodes_.shards(), slots, outcomes);
+  const std::uint64_t shards = nodes_.shards() | (to_all ? routes_.shards() : 0);
+  if (!arrival.handed_over()) to_other_shards(run, shards, slots, outcomes);
   settle(run, outcomes);
+}
+
+/// The link is the way to the neighbour at its other end, which is not the one before this hub.
+bool Router::carries_to(const Recipient& link, HubId before) const {
+  const HubId neighbour = hub_of(link.node);
+  const NextHop next = routes_.find(neighbour);
+  return neighbour != before && next.neighbour == neighbour && next.link.slot == link.slot &&
+         next.link.generation == link.generation;
 }
 
 }  // namespace gimnet::hub

@@ -114,6 +114,7 @@ class Router {
   void to_listed(const Run& frame, const proto::FrameHeader& header, NodeId node,
                  const NodePlace& place);
   void to_everybody(const Run& run, const proto::FrameHeader& header, Arrival arrival);
+  [[nodiscard]] bool carries_to(const Recipient& link, HubId before) const;
   /// deliveries: at each of them.
   void to_other_shards(const Run& run, std::uint64_t shards, std::size_t deliveries,
                        std::uint32_t& outcomes);

@@ -33,6 +33,12 @@ class RouteTable {
     // release pairs with the acquire in find(): who sees the link sees its neighbour.
     links_[hub.value()].store(pack(next.link), std::memory_order_release);
   }
+  /// The shards (a bit set) with a link that is a next hop.
+  void publish_shards(std::uint64_t shards) { shards_.store(shards, std::memory_order_relaxed); }
+  [[nodiscard]] std::uint64_t shards() const {
+    // relaxed: a shard that is missed had no link a moment ago
+    return shards_.load(std::memory_order_relaxed);
+  }
   [[nodiscard]] NextHop find(HubId hub) const {
     // acquire pairs with the release in publish()
     const NodePlace link = unpack(links_[hub.value()].load(std::memory_order_acquire));
@@ -42,6 +48,7 @@ class RouteTable {
  private:
   std::array<std::atomic<std::uint64_t>, kHubIds> links_{};
   std::array<std::atomic<std::uint16_t>, kHubIds> neighbours_{};
+  std::atomic<std::uint64_t> shards_{0};
 };
 
 }  // namespace gimnet::hub
