@@ -147,16 +147,17 @@ void GroupLinks::publish_away(GroupId group) {
 }
 
 std::optional<TablePublisher::AwayGroup> GroupLinks::away_group(GroupId group) const {
-  const auto* branches = trees_.branches(group);
-  const bool wanted = parts_.membership.services().find_group(group) != nullptr;
-  if (!wanted && (branches == nullptr || branches->empty())) return std::nullopt;
+  // Links may want groups of hubs that nobody knows: no table is made for them.
+  const Neighbour* parent = find(trees_.parent(group));
+  if (parent == nullptr && parts_.membership.services().find_group(group) == nullptr)
+    return std::nullopt;
   TablePublisher::AwayGroup away;
   const NameCopies* names = parts_.names.copies();
   if (const auto known = names != nullptr ? names->find_group(group) : std::nullopt) {
     away.provider = known->claim->node;
     away.retain = known->claim->service->retain;
   }
-  if (const Neighbour* parent = find(trees_.parent(group))) {
+  if (parent != nullptr) {
     away.parent = parent->hub;
     away.link = node_place(parent->place);
   }

@@ -130,9 +130,11 @@ TEST_F(GroupLinksTest, PassesAGroupOfAnotherHubOn) {
   static_cast<void>(join(kUp, kAwayGroup));
   EXPECT_EQ(away()->by_shard[0].size(), 1u) << "never back to the parent";
   static_cast<void>(take(kDown, route::Leave{{kAwayGroup}}));
-  EXPECT_EQ(away()->parent, HubId{}) << "the neighbour wants it from here, and is the way to it";
+  EXPECT_EQ(away(), nullptr) << "the neighbour wants it from here, and is the way to it";
   static_cast<void>(take(kUp, route::Leave{{kAwayGroup}}));
-  EXPECT_EQ(away(), nullptr);
+  static_cast<void>(join(kDown, make_id<GroupId>(HubId{31}, 1)));
+  EXPECT_EQ(rig_.group_table.find_away(make_id<GroupId>(HubId{31}, 1)), nullptr)
+      << "there is no way to that hub";
 }
 
 TEST_F(GroupLinksTest, AnAnswerWaitsUntilMessagesComeOrASecond) {
