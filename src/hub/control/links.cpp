@@ -271,7 +271,7 @@ void Links::tick(Moment moment) {
 }
 
 std::optional<milliseconds> Links::next_deadline() const {
-  std::optional<milliseconds> due = links_.empty() ? std::nullopt : network_.next_due();
+  std::optional<milliseconds> due = network_.next_due();
   const auto note = [&due](std::optional<milliseconds> time) {
     if (time && (!due || *time < *due)) due = time;
   };

@@ -174,6 +174,17 @@ TEST(Links, TheShorterOfTwoWaysIsTakenAndTheOtherWhenItEnds) {
   EXPECT_NE(hubs.b.links.remove("second"), "") << "there is none any more";
 }
 
+TEST(Links, TheLastOneThatIsRemovedLeavesNobodyReachable) {
+  LinkedRigs hubs(LinkRig::dialling("only", 5));
+  hubs.link();
+  hubs.pass(milliseconds{100});
+  ASSERT_EQ(hubs.b.links.network().map().reachable().size(), 2u);
+  ASSERT_EQ(hubs.b.links.remove("only"), "");
+  ASSERT_TRUE(hubs.b.links.next_deadline()) << "there is a map to be computed";
+  hubs.b.pass(milliseconds{100});
+  EXPECT_EQ(hubs.b.links.network().map().reachable().size(), 1u);
+}
+
 TEST(Links, KeepAlivesMeasureTheRoundTripAndTheOtherClock) {
   LinkedRigs hubs;
   hubs.a.clock_ahead_ns = 5'000'000'000;
