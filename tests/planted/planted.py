@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 TABLE = ROOT / "tests" / "planted" / "bugs.toml"
-SIMULATIONS = ("gimnet-sim", "gimnet-sim-routes")
+SIMULATIONS = ("gimnet-sim", "gimnet-sim-routes", "gimnet-sim-hubs")
 FUZZ_SECONDS = 60  # a fuzz target has so long for its bug
 SLOW_LEAST, SLOW_MOST = 0.03, 0.08  # a planted slow-down adds about a twentieth, to show that no half is needed
 

@@ -1,0 +1,158 @@
+#include <algorithm>
+
+#include "base/id_text.hpp"
+#include "tests/sim/hubs/world.hpp"
+
+// Looks at a world that was left alone: names, and whether everybody reaches everybody.
+
+namespace gimnet::sim::hubs {
+namespace {
+
+/// To so many others each node sends; in a small world, to all.
+constexpr std::size_t kSendsMost = 40;
+constexpr std::size_t kSendsOfAllMost = 2'000;
+/// Names that are asked for at each hub, beside those that several nodes want.
+constexpr std::size_t kNamesMost = 12;
+/// Of one link, with its jitter.
+constexpr std::uint64_t kSlowestMs = 60;
+constexpr std::uint64_t kFrameBytesMost = 140;
+
+std::uint64_t hop_limits(const hub::ShardCounters& counters) {
+  return counters.dropped[static_cast<std::size_t>(proto::DropReason::hop_limit)].value();
+}
+
+}  // namespace
+
+void Settled::ask_names() {
+  for (const SimNode& node : world_.nodes_) {
+    const bool shared = node.plan().name.starts_with("shared");
+    const bool known = std::ranges::find(names_, node.plan().name) != names_.end();
+    if (!known && (shared || names_.size() < kNamesMost)) names_.push_back(node.plan().name);
+  }
+  for (SimNode& person : world_.operators_) {
+    if (!person.is_up())
+      broken(Checker::reachable, "hub " + std::to_string(person.plan().hub) + " serves nobody");
+    for (const std::string& name : names_) person.resolve(name, {});
+  }
+}
+
+void Settled::check_names() {
+  for (const std::string& name : names_) {
+    for (SimNode& person : world_.operators_) {
+      std::vector<NodeId> owners;
+      for (const SimNode& node : world_.nodes_) {
+        const bool near = distance_[person.plan().hub][node.plan().hub] >= 0;
+        if (near && node.is_up() && node.name() == name) owners.push_back(node.id());
+      }
+      const std::string words = "'" + name + "' at hub " + std::to_string(person.plan().hub);
+      if (owners.size() > 1) broken(Checker::one_owner, words + " has two owners");
+      const auto said = person.resolved().find(name);
+      if (said == person.resolved().end()) broken(Checker::answered, "nobody answers for " + words);
+      const NodeId owner = owners.empty() ? NodeId{} : owners.front();
+      if (said->second != owner)
+        broken(Checker::one_owner, words + " is said to be of " + to_string(said->second) +
+                                       " and is of " + to_string(owner));
+    }
+  }
+}
+
+void Settled::send_to_all() {
+  std::uint64_t limits = 0;
+  for (const Machine& machine : world_.machines_) limits += hop_limits(machine.hub->counters());
+  std::vector<SimNode*> up;
+  for (SimNode& node : world_.operators_) up.push_back(&node);
+  for (SimNode& node : world_.nodes_)
+    if (node.is_up()) up.push_back(&node);
+  const std::size_t most = std::clamp<std::size_t>(kSendsOfAllMost / up.size(), 1, kSendsMost);
+  for (SimNode* from : up) {
+    std::size_t sent = 0;
+    const auto first = static_cast<std::size_t>(world_.random_.below(up.size()));
+    for (std::size_t i = 0; i < up.size() && sent < most; ++i) {
+      const SimNode& to = *up[(first + i) % up.size()];
+      const int links = distance_[from->plan().hub][to.plan().hub];
+      if (&to == from || links < 0 || links > proto::kHopsMax) continue;
+      const auto number = from->send_to(to.id());
+      if (!number)
+        broken(Checker::resumes,
+               "node " + from->plan().name + " is still paused for " + to_string(to.id()));
+      pairs_.push_back({from, &to, *number});
+      ++sent;
+    }
+  }
+  std::uint64_t enough_ms = 1'000 + kSlowestMs * distance_.size();
+  for (const Wire& wire : world_.wires_) {
+    if (wire.plan.bytes_per_ms == 0) continue;
+    enough_ms = std::max(enough_ms, pairs_.size() * kFrameBytesMost / wire.plan.bytes_per_ms);
+  }
+  world_.run_until(world_.now() + milliseconds{enough_ms});
+  std::uint64_t later = 0;
+  for (const Machine& machine : world_.machines_) later += hop_limits(machine.hub->counters());
+  if (later != limits) broken(Checker::no_loop, "frames are still dropped for their hops");
+}
+
+void Settled::check_arrivals() const {
+  const auto title = [](const SimNode& node) {
+    return node.plan().name + " at hub " + std::to_string(node.plan().hub) +
+           (node.is_up() ? "" : ", which is down") +
+           (node.last().empty() ? "" : ", which " + node.last());
+  };
+  for (const Pair& pair : pairs_) {
+    if (world_.book_.has_arrived(pair.number)) continue;
+    broken(Checker::reachable, "frame " + std::to_string(pair.number) + " of " + title(*pair.from) +
+                                   " does not come to " + title(*pair.to) + drops());
+  }
+}
+
+/// Why frames were dropped at all hubs, in words.
+std::string Settled::drops() const {
+  std::string words;
+  for (std::size_t reason = 0; reason < proto::kDropReasonCount; ++reason) {
+    std::uint64_t dropped = 0;
+    for (const Machine& machine : world_.machines_)
+      dropped += machine.hub->counters().dropped[reason].value();
+    if (dropped != 0)
+      words += std::string{", "} + proto::drop_reason_name(static_cast<proto::DropReason>(reason)) +
+               " " + std::to_string(dropped);
+  }
+  return words;
+}
+
+void Settled::check_rest() {
+  for (const SimNode& node : world_.nodes_)
+    if (node.is_up() && node.is_paused())
+      broken(Checker::resumes, "node " + node.plan().name + " stays paused");
+  for (const Machine& machine : world_.machines_) {
+    for (const auto& connection : machine.hub->shard().connections) {
+      if (connection == nullptr || !connection->connected) continue;
+      if (connection->holds != 0 || connection->outbox.paused_anyone())
+        broken(Checker::resumes, "a connection is held, or holds others");
+    }
+    for (const auto& [number, link] : machine.hub->links().all())
+      if (!link->is_dialled() && !link->connected() && !link->place)
+        broken(Checker::bounded, "a hub keeps a link that nobody dials");
+    const hub::ShardCounters& counters = machine.hub->counters();
+    if (counters.dropped[static_cast<std::size_t>(proto::DropReason::link_unsure)].value() != 0)
+      world_.census_.note(Event::unsure);
+  }
+}
+
+/// delivered(A) <= accepted(B), and equal where no connection was lost.
+void Settled::check_ledgers() const {
+  for (std::size_t index = 0; index < world_.wires_.size(); ++index) {
+    const Wire& wire = world_.wires_[index];
+    const hub::HubLink* const ends[] = {world_.find_link(index, 0), world_.find_link(index, 1)};
+    if (ends[0] == nullptr || ends[1] == nullptr || !ends[0]->place || !ends[1]->place) continue;
+    if (wire.counted[0].line != wire.counted[1].line || wire.counted[0].line == 0) continue;
+    const hub::SessionCounts counts[] = {
+        world_.machines_[wire.plan.dialler].hub->counts(*ends[0]->place),
+        world_.machines_[wire.plan.acceptor].hub->counts(*ends[1]->place)};
+    for (const std::size_t end : {std::size_t{0}, std::size_t{1}}) {
+      if (counts[end].delivered == counts[1 - end].accepted) continue;
+      broken(Checker::ledgers, "wire " + std::to_string(index) + ": " +
+                                   std::to_string(counts[end].delivered) + " delivered, " +
+                                   std::to_string(counts[1 - end].accepted) + " accepted");
+    }
+  }
+}
+
+}  // namespace gimnet::sim::hubs

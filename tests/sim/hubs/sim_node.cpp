@@ -1,0 +1,261 @@
+#include "tests/sim/hubs/sim_node.hpp"
+
+#include <iterator>
+
+#include "base/endian.hpp"
+#include "proto/control/ns.hpp"
+#include "proto/control/ns_register.hpp"
+
+namespace gimnet::sim::hubs {
+namespace {
+
+namespace ns = proto::ns;
+using proto::Kind;
+using proto::Lane;
+
+/// A request that another hub does not answer is answered by the own hub after 5 s, on a clock that
+/// may have stood still.
+constexpr milliseconds kAnswerMost{9'000};
+constexpr milliseconds kPauseOfAnotherHub{1'000};
+constexpr std::size_t kAskedMost = 16;
+constexpr std::uint64_t kSmallBytes = 100;
+constexpr std::uint64_t kLargeBytes = 20'000;
+
+}  // namespace
+
+void SimNode::step(SimHub* hub, milliseconds now, std::uint64_t says_every) {
+  now_ = now;
+  if (!up_) {
+    if (hub != nullptr && now >= back_at_) join(*hub, now);
+    return;
+  }
+  read(now);
+  std::erase_if(paused_, [now](const auto& each) { return each.second && *each.second <= now; });
+  if (!is_up()) return;
+  if (says_every != 0 && now >= say_at_) {
+    say_at_ = now + milliseconds{around_.random.between(1, 2 * says_every)};
+    say();
+  }
+  if (!asked_.empty() && now - asked_.begin()->second.at > kAnswerMost)
+    broken(Checker::answered, "a request of node " + plan_.name + " is never answered");
+}
+
+void SimNode::join(SimHub& hub, milliseconds now) {
+  auto [stream, peer] = hub::make_memory_pipe();
+  pipe_ = std::move(peer);
+  stream_.clear();
+  opened_ = welcomed_ = false;
+  paused_.clear();
+  asked_.clear();
+  hub::Stranger stranger;
+  stranger.transport = std::move(stream);
+  stranger.peer = {"unix", plan_.name};
+  stranger.identity = hub::Identity::of_user(administers_ ? 0 : 1'000);
+  stranger.rights.administer = administers_;
+  proto::Hello hello;
+  hello.role = administers_ ? proto::Role::admin : proto::Role::node;
+  hello.token = token_;
+  if (wants_name_) hello.name = plan_.name;
+  const auto refused = hub.admit(std::move(stranger), pipe_, hello, now);
+  back_at_ = now + milliseconds{around_.random.between(50, 500)};
+  if (refused) {
+    around_.census.note(Event::refused_name);
+    token_.clear();
+    wants_name_ = around_.random.chance(500);
+    return;
+  }
+  wants_name_ = true;
+  up_ = true;
+  // A hub that was started again knows the session no more, and its token gives the id back.
+  const bool same = id_ == hub.admitted().node && !token_.empty();
+  id_ = hub.admitted().node;
+  session_ = around_.book.note_session(plan_.hub, id_, !same);
+  if (hub.admitted().new_session) group_.reset();
+}
+
+void SimNode::crash(milliseconds now) {
+  if (!up_) return;
+  around_.census.note(Event::node_crashed);
+  if (around_.random.chance(500)) {
+    pipe_.close();
+  } else {
+    pipe_.reset();
+  }
+  up_ = false;
+  last_ = "crashed at " + std::to_string(now.count());
+  if (around_.random.chance(500)) token_.clear();
+  back_at_ = now + milliseconds{around_.random.between(1, 2'000)};
+}
+
+void SimNode::read(milliseconds now) {
+  const std::size_t most =
+      plan_.reads_per_ms == 0 ? hub::MemoryPeer::kAll : std::size_t{plan_.reads_per_ms};
+  if (plan_.reads_per_ms != 0) pipe_.set_room(4'096);
+  const bool gone = pipe_.transport_gone();
+  const bool more = pipe_.read(stream_, most) != 0;
+  std::size_t next = 0;
+  if (!opened_ && stream_.size() >= proto::kOpeningSize) {
+    opened_ = true;
+    next = proto::kOpeningSize;
+  }
+  while (opened_ && stream_.size() - next >= proto::kHeaderSize) {
+    const proto::FrameHeader header = proto::load_header(stream_.data() + next);
+    if (stream_.size() - next < header.frame_size()) break;
+    take(header, std::span(stream_).subspan(next + proto::kHeaderSize, header.length));
+    next += header.frame_size();
+  }
+  stream_.erase(stream_.begin(), stream_.begin() + static_cast<std::ptrdiff_t>(next));
+  if (!gone || more) return;
+  last_ = "lost its connection at " + std::to_string(now.count());
+  up_ = false;
+  back_at_ = now + milliseconds{around_.random.between(20, 500)};
+}
+
+void SimNode::take(const proto::FrameHeader& header, std::span<const std::byte> payload) {
+  switch (header.kind) {
+    case Kind::unicast:
+    case Kind::service: {
+      const std::uint32_t own =
+          header.kind == Kind::unicast ? id_.value() : group_.value_or(GroupId{}).value();
+      if (header.dst != own) broken(Checker::right_node, "a node gets a frame for another id");
+      return around_.book.note_arrived(payload, session_);
+    }
+    case Kind::flow:
+      return take_flow(payload);
+    case Kind::report:
+      return around_.census.note(Event::no_route);
+    case Kind::link:
+      if (const auto welcome = proto::decode<proto::Welcome>(payload)) {
+        welcomed_ = true;
+        name_ = welcome->name;
+        token_ = welcome->token;
+        if (!administers_ && around_.random.chance(400)) offer();
+      }
+      return;
+    default:
+      return take_control(payload);
+  }
+}
+
+void SimNode::take_flow(std::span<const std::byte> payload) {
+  const auto message = proto::flow::decode(payload);
+  if (!message) return;
+  if (const auto* ping = std::get_if<proto::flow::Ping>(&*message)) {
+    std::byte bytes[proto::flow::kFrameSizeMax];
+    const proto::flow::Pong pong{ping->sequence, ping->sent_ns, ping->sent_ns};
+    pipe_.write({bytes, proto::flow::encode_frame(pong, id_, bytes)});
+  } else if (const auto* pause = std::get_if<proto::flow::Pause>(&*message)) {
+    around_.census.note(Event::paused_sender);
+    const bool elsewhere = hub_of(NodeId{pause->target.dst}) != hub_of(id_);
+    paused_[{pause->target.kind, pause->target.lane, pause->target.dst}] =
+        elsewhere ? std::optional{now_ + kPauseOfAnotherHub} : std::nullopt;
+  } else if (const auto* resume = std::get_if<proto::flow::Resume>(&*message)) {
+    paused_.erase({resume->target.kind, resume->target.lane, resume->target.dst});
+  }
+}
+
+void SimNode::take_control(std::span<const std::byte> payload) {
+  const auto view = proto::split_control(payload);
+  if (!view) return;
+  if (!view->header.is_answer()) {
+    const auto lost = proto::decode<ns::NameLost>(payload);
+    if (!lost) return;
+    around_.census.note(Event::lost_name);
+    if (lost->name == name_) name_.clear();
+    return;
+  }
+  const auto found = asked_.find(view->header.request);
+  if (found == asked_.end())
+    broken(Checker::answered, "node " + plan_.name + " gets an answer that it did not ask for");
+  const std::string name = found->second.name;
+  asked_.erase(found);
+  if (const auto offered = proto::decode_answer<ns::AdvertiseAnswer>(payload)) {
+    group_ = offered->group;
+    return around_.book.note_group(offered->group, session_);
+  }
+  if (name.empty()) return;
+  const auto answer = proto::decode_answer<ns::ResolveAnswer>(payload);
+  const bool held = answer && answer->standing == ns::NameStanding::held;
+  resolved_[name] = held ? answer->node : NodeId{};
+}
+
+void SimNode::say() {
+  Random& random = around_.random;
+  const std::uint64_t choice = random.below(100);
+  const std::uint64_t bytes_most = random.chance(30) ? kLargeBytes : kSmallBytes;
+  const proto::Policy policy = random.chance(800) ? proto::Policy::block : proto::Policy::drop;
+  if (choice < 10) return ask_something();
+  if (choice < 25 && !around_.book.groups().empty()) {
+    auto entry = around_.book.groups().begin();
+    std::advance(entry, static_cast<std::ptrdiff_t>(random.below(around_.book.groups().size())));
+    // Nobody knows who has it by then.
+    static_cast<void>(send(Kind::service, entry->first.value(), 0, bytes_most, policy));
+    return;
+  }
+  const auto& known = around_.book.known();
+  const NodeId to = random.pick(known);
+  if (to == id_) return;
+  static_cast<void>(
+      send(Kind::unicast, to.value(), around_.book.session_of(to), bytes_most, policy));
+}
+
+void SimNode::ask_something() {
+  const NodeId other = around_.random.pick(around_.book.known());
+  if (asked_.size() >= kAskedMost) return;
+  around_.census.note(Event::asked_another_hub);
+  resolve(plan_.name, around_.random.chance(700) ? hub_of(other) : HubId{});
+}
+
+void SimNode::offer() {
+  if (name_.empty()) return;
+  ns::Advertise advertise;
+  advertise.service = "takes";
+  advertise.direction = ns::Direction::accepts;
+  ++last_request_;
+  ask(Kind::ns, proto::encode(advertise, last_request_), last_request_, {});
+}
+
+void SimNode::resolve(const std::string& name, HubId hub) {
+  ++last_request_;
+  ask(Kind::ns, proto::encode(ns::Resolve{name}, last_request_), last_request_, hub);
+  asked_[last_request_].name = name;
+}
+
+void SimNode::ask(Kind kind, const proto::Payload& payload, std::uint16_t request, HubId hub) {
+  asked_[request] = {now_, {}};
+  write(kind, hub == HubId{} ? 0 : make_id<NodeId>(hub, kHubIndex).value(), payload);
+}
+
+std::optional<std::uint64_t> SimNode::send_to(NodeId to) {
+  return send(Kind::unicast, to.value(), around_.book.session_of(to), kSmallBytes,
+              proto::Policy::block);
+}
+
+std::optional<std::uint64_t> SimNode::send(Kind kind, std::uint32_t dst, std::uint64_t session,
+                                           std::uint64_t bytes_most, proto::Policy policy) {
+  if (paused_.contains({kind, Lane::normal, dst})) return std::nullopt;
+  const std::uint64_t bytes = Book::kNumberBytes + around_.random.below(bytes_most);
+  const std::uint64_t number = around_.book.note_sent(plan_.hub, session);
+  std::vector<std::byte> payload(static_cast<std::size_t>(bytes));
+  store_le(payload.data(), number);
+  const auto flags = static_cast<std::uint8_t>(policy) | unsigned{proto::kFlagReport};
+  write(kind, dst, payload, static_cast<std::uint8_t>(flags));
+  return number;
+}
+
+void SimNode::write(Kind kind, std::uint32_t dst, std::span<const std::byte> payload,
+                    std::uint8_t flags) {
+  proto::FrameHeader header;
+  header.length = static_cast<std::uint32_t>(payload.size());
+  header.dst = dst;
+  header.src = id_.value();
+  header.kind = kind;
+  header.flags = flags;
+  header.lane = static_cast<std::uint8_t>(Lane::normal);
+  std::vector<std::byte> bytes(proto::kHeaderSize);
+  proto::store_header(bytes.data(), header);
+  bytes.insert(bytes.end(), payload.begin(), payload.end());
+  pipe_.write(bytes);
+}
+
+}  // namespace gimnet::sim::hubs

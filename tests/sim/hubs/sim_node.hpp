@@ -1,0 +1,100 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "proto/control/control_message.hpp"
+#include "proto/frame/flow.hpp"
+#include "tests/sim/hubs/book.hpp"
+#include "tests/sim/hubs/census.hpp"
+#include "tests/sim/hubs/plan.hpp"
+#include "tests/sim/hubs/sim_hub.hpp"
+
+namespace gimnet::sim::hubs {
+
+/// A program at one hub: it joins, comes back, asks, and sends to nodes of all hubs. It heeds
+/// PAUSE. Thread safety: none.
+class SimNode {
+ public:
+  struct Around {
+    Random& random;
+    Book& book;
+    Census& census;
+  };
+  SimNode(const Around& around, const NodePlan& plan, bool administers)
+      : around_(around), plan_(plan), administers_(administers) {}
+
+  /// `hub`: null while it does not run. `says_every`: ms between two messages, 0: it says nothing.
+  void step(SimHub* hub, milliseconds now, std::uint64_t says_every);
+  /// Its process ends, and comes back later with or without its memory.
+  void crash(milliseconds now);
+
+  [[nodiscard]] bool is_up() const { return up_ && welcomed_; }
+  [[nodiscard]] const NodePlan& plan() const { return plan_; }
+  [[nodiscard]] NodeId id() const { return id_; }
+  [[nodiscard]] const std::string& name() const { return name_; }
+  [[nodiscard]] const std::string& last() const { return last_; }
+  [[nodiscard]] bool is_paused() const { return !paused_.empty(); }
+
+  /// A small frame. Returns its number; nothing: it was told to pause. REQUIRES: is_up().
+  std::optional<std::uint64_t> send_to(NodeId to);
+  void ask(proto::Kind kind, const proto::Payload& payload, std::uint16_t request, HubId hub);
+  void resolve(const std::string& name, HubId hub);
+  template <class Message>
+  void command(const Message& message) {
+    ++last_request_;
+    ask(proto::Kind::ctrl, proto::encode(message, last_request_), last_request_, {});
+  }
+  /// The answers to resolve(), by name: 0 if nobody holds it.
+  [[nodiscard]] std::map<std::string, NodeId>& resolved() { return resolved_; }
+
+ private:
+  struct Asked {
+    milliseconds at;
+    std::string name;  ///< that was to be resolved
+  };
+  void join(SimHub& hub, milliseconds now);
+  void say();
+  void ask_something();
+  void offer();
+  void read(milliseconds now);
+  void take(const proto::FrameHeader& header, std::span<const std::byte> payload);
+  void take_flow(std::span<const std::byte> payload);
+  void take_control(std::span<const std::byte> payload);
+  void write(proto::Kind kind, std::uint32_t dst, std::span<const std::byte> payload,
+             std::uint8_t flags = 0);
+  std::optional<std::uint64_t> send(proto::Kind kind, std::uint32_t dst, std::uint64_t session,
+                                    std::uint64_t bytes_most, proto::Policy policy);
+
+  const Around around_;
+  const NodePlan plan_;
+  const bool administers_;
+  std::string last_;  ///< how its last connection ended
+  bool up_ = false;
+  bool welcomed_ = false;
+  hub::MemoryPeer pipe_;
+  std::vector<std::byte> stream_;
+  bool opened_ = false;
+  NodeId id_;
+  std::uint64_t session_ = 0;
+  std::string name_;
+  std::vector<std::byte> token_;
+  std::optional<GroupId> group_;  ///< of its service, which takes data
+  milliseconds now_{0};
+  milliseconds back_at_{0};
+  milliseconds say_at_{0};
+  bool wants_name_ = true;
+  std::uint16_t last_request_ = 0;
+  std::map<std::uint16_t, Asked> asked_;
+  std::map<std::string, NodeId> resolved_;
+  /// By kind, lane and destination: until when. Nothing: until RESUME.
+  std::map<std::tuple<proto::Kind, proto::Lane, std::uint32_t>, std::optional<milliseconds>>
+      paused_;
+};
+
+}  // namespace gimnet::sim::hubs
