@@ -47,6 +47,7 @@
 #include "gimnet/gimi_message.h"
 #include "gimnet/gimi_options.h"
 #include "gimnet/gimi_records.h"
+#include "gimnet/gimi_requests.h"
 #include "gimnet/gimi_types.h"
 
 #ifdef __cplusplus

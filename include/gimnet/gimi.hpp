@@ -9,8 +9,10 @@
 #include <vector>
 
 #include "gimnet/gimi.h"
+#include "gimnet/gimi/answers.hpp"
 #include "gimnet/gimi/conversions.hpp"
 #include "gimnet/gimi/handles.hpp"
+#include "gimnet/gimi/hub_access.hpp"
 #include "gimnet/gimi/message.hpp"
 #include "gimnet/gimi/node_state.hpp"
 #include "gimnet/gimi/options.hpp"
@@ -45,7 +47,7 @@
 namespace gimnet::inline v0_9 {
 
 /// A member of the network. Leaves for good when it is destroyed.
-class Node {
+class Node : public HubAccess {
  public:
 #if defined(__cpp_exceptions)
   /// Joins; `name` and `hub` as in NodeOptions. Throws GimnetError.
@@ -62,7 +64,7 @@ class Node {
     return Node(handle);
   }
 
-  Node(Node&& other) noexcept : handle_(std::exchange(other.handle_, 0)) {}
+  Node(Node&& other) noexcept : HubAccess(std::exchange(other.handle_, 0)) {}
   Node& operator=(Node&& other) noexcept {
     const Node old(std::move(*this));
     handle_ = std::exchange(other.handle_, 0);
@@ -207,6 +209,40 @@ class Node {
     });
   }
 
+  // ---- requests
+
+  /// Asks whoever answers that service, and waits for the end of the request, of which there is
+  /// exactly one. gimnet/gimi_requests.h tells which there are, and whether the work was done.
+  [[nodiscard]] Reply request(std::string_view service, BytesView data = {},
+                              Timeout timeout = Timeout{5000},
+                              const RequestOptions& options = {}) const {
+    const gimi_request_options how = detail::options_of(options, timeout);
+    const gimi_bytes bytes{data.data(), data.size()};
+    gimi_reply ended{};
+    const gimi_status status =
+        gimi_ask(handle_, std::string(service).c_str(), &bytes, &how, &ended);
+    return Reply(status, ended);
+  }
+  /// The same without waiting for the end. Errors: as a request that was not sent.
+  Outcome<PendingReply> request_later(std::string_view service, BytesView data = {},
+                                      Timeout timeout = Timeout{5000},
+                                      const RequestOptions& options = {}) const {
+    const gimi_request_options how = detail::options_of(options, timeout);
+    const gimi_bytes bytes{data.data(), data.size()};
+    return detail::made<PendingReply>([&](gimi_handle* made) {
+      return gimi_ask_later(handle_, std::string(service).c_str(), &bytes, &how, made);
+    });
+  }
+  /// Lists the service `own name/name`, which answers requests. Errors: as advertise().
+  Outcome<Answers> answer(std::string_view name, Timeout timeout = Timeout{5000}) const {
+    gimi_answer_options how{};
+    how.struct_size = sizeof how;
+    how.timeout_ms = milliseconds_in_options(timeout);
+    return detail::made<Answers>([&](gimi_handle* made) {
+      return gimi_answer(handle_, std::string(name).c_str(), &how, made);
+    });
+  }
+
   // ---- the own name
 
   /// Takes another name in place of the one this node has. Id and subscriptions stay; services end
@@ -270,101 +306,6 @@ class Node {
       return gimi_services(handle_, std::string(pattern).c_str(), milliseconds_of(timeout), list);
     });
   }
-  /// The hub itself, the counters of its io threads, its connections (ascending ids), the hubs that
-  /// it knows (ascending ids), and its links to others (docs/operations.md). `hub_id` names another
-  /// hub of the network; 0 is the own hub. Errors also: not_found (there is no way to that hub).
-  Outcome<HubRecord> hub(Timeout timeout = Timeout{5000}, std::uint32_t hub_id = 0) const {
-    auto records = detail::listed<gimi_hub_record>([&](gimi_list* list) {
-      return gimi_hub(handle_, GIMI_HUB, hub_id, milliseconds_of(timeout), list);
-    });
-    if (!records) return records.failure();
-    return std::move(records->front());
-  }
-  Outcome<std::vector<ShardCounts>> hub_counters(Timeout timeout = Timeout{5000},
-                                                 std::uint32_t hub_id = 0) const {
-    gimi_list list{};
-    const gimi_status status =
-        gimi_hub(handle_, GIMI_HUB_COUNTERS, hub_id, milliseconds_of(timeout), &list);
-    if (status != GIMI_OK) return failure_of(status);
-    return detail::counts_of(list);
-  }
-  Outcome<std::vector<ConnectionRecord>> hub_connections(Timeout timeout = Timeout{5000},
-                                                         std::uint32_t hub_id = 0) const {
-    return detail::listed<gimi_connection_record>([&](gimi_list* list) {
-      return gimi_hub(handle_, GIMI_HUB_CONNECTIONS, hub_id, milliseconds_of(timeout), list);
-    });
-  }
-  Outcome<std::vector<NetworkHub>> hubs(Timeout timeout = Timeout{5000},
-                                        std::uint32_t hub_id = 0) const {
-    return detail::listed<gimi_network_hub_record>([&](gimi_list* list) {
-      return gimi_hub(handle_, GIMI_HUB_NETWORK, hub_id, milliseconds_of(timeout), list);
-    });
-  }
-  Outcome<std::vector<LinkRecord>> hub_links(Timeout timeout = Timeout{5000},
-                                             std::uint32_t hub_id = 0) const {
-    return detail::listed<gimi_link_record>([&](gimi_list* list) {
-      return gimi_hub(handle_, GIMI_HUB_LINKS, hub_id, milliseconds_of(timeout), list);
-    });
-  }
-
-  // ---- changing the hub, for those who joined as administrators; everybody else is denied
-
-  /// Ends the session of a node, which is told `reason` (at most 256 bytes) and does not come back
-  /// by itself; its token counts for nothing from then on. Answers with what the hub cannot promise
-  /// (its disk is full, and it would forget that at a restart), as a rule nothing. Errors:
-  /// not_found, denied, bad_argument (this node itself, a longer reason).
-  Outcome<std::string> kick(Peer node, std::string_view reason = {},
-                            Timeout timeout = Timeout{5000}) const {
-    return detail::text([&](char* remark, std::size_t size) {
-      return gimi_kick(handle_, node.id, std::string(reason).c_str(), milliseconds_of(timeout),
-                       remark, size);
-    });
-  }
-  /// The node goes on under another id of its hub. Errors: not_found, taken, denied, bad_argument,
-  /// limit (the hub cannot keep that over a restart: its disk is full).
-  Outcome<void> reassign(Peer node, Peer new_id, Timeout timeout = Timeout{5000}) const {
-    return detail::outcome_of(
-        gimi_reassign(handle_, {node.id, new_id.id}, milliseconds_of(timeout)));
-  }
-  /// The hub writes what waits, says goodbye to everybody, and ends.
-  Outcome<void> drain_hub(Timeout timeout = Timeout{5000}) const {
-    return detail::outcome_of(gimi_drain_hub(handle_, milliseconds_of(timeout)));
-  }
-  /// The hub reads its configuration again. Errors: bad_argument (it is wrong, and nothing was
-  /// changed), denied.
-  Outcome<std::vector<HubChange>> reload_hub(Timeout timeout = Timeout{5000}) const {
-    return detail::listed<gimi_hub_change_record>(
-        [&](gimi_list* list) { return gimi_reload_hub(handle_, milliseconds_of(timeout), list); });
-  }
-  /// The hub dials one link more, until it ends; an empty name is the URL, cost 0 is measured.
-  /// `proxy`: the URL of an HTTP proxy to dial through; the password in it goes to the hub alone.
-  /// Errors: bad_argument (no URL, a name that is there, another machine without `insecure`).
-  Outcome<void> add_link(std::string_view url, std::string_view name = {}, std::uint16_t cost = 0,
-                         std::string_view proxy = {}, Timeout timeout = Timeout{5000}) const {
-    const std::string texts[] = {std::string(url), std::string(name), std::string(proxy)};
-    const gimi_link_options link{sizeof link, texts[0].c_str(), texts[1].c_str(), cost,
-                                 0,           texts[2].c_str()};
-    return detail::outcome_of(gimi_add_link(handle_, &link, milliseconds_of(timeout)));
-  }
-  /// Ends a link that the hub dials. Errors: not_found.
-  Outcome<void> remove_link(std::string_view name, Timeout timeout = Timeout{5000}) const {
-    return detail::outcome_of(
-        gimi_remove_link(handle_, std::string(name).c_str(), milliseconds_of(timeout)));
-  }
-  /// Fixes the cost of a link that the hub dials; 0: measured. Errors: not_found.
-  Outcome<void> set_link_cost(std::string_view name, std::uint16_t cost,
-                              Timeout timeout = Timeout{5000}) const {
-    return detail::outcome_of(
-        gimi_set_link_cost(handle_, std::string(name).c_str(), cost, milliseconds_of(timeout)));
-  }
-  /// error, warning, info, debug or off. The level before. Errors: bad_argument, denied.
-  Outcome<std::string> set_hub_log_level(std::string_view level,
-                                         Timeout timeout = Timeout{5000}) const {
-    return detail::text([&](char* before, std::size_t size) {
-      return gimi_set_hub_log_level(handle_, std::string(level).c_str(), milliseconds_of(timeout),
-                                    before, size);
-    });
-  }
 
   /// Sends a small message to the library of another node, which answers by itself with `echo` in
   /// it. The round trip in ns, in that lane there and back. Errors: timeout (lost, or late),
@@ -391,9 +332,7 @@ class Node {
   }
 
  private:
-  explicit Node(gimi_handle handle) : handle_(handle) {}
-
-  gimi_handle handle_ = 0;
+  explicit Node(gimi_handle handle) : HubAccess(handle) {}
 };
 
 }  // namespace gimnet::inline v0_9

@@ -12,8 +12,9 @@
 extern "C" {
 #endif
 
-/** Names a node, publisher, subscription, queue, sender or watch: kind (8 bits), slot (24 bits) and
- * generation (32 bits). 0 is no handle. One of another kind, closed, or never given is refused. */
+/** Names a node, publisher, subscription, queue, sender, watch, answering service or request: kind
+ * (8 bits), slot (24 bits) and generation (32 bits). 0 is no handle. One of another kind, closed,
+ * or never given is refused. */
 typedef uint64_t gimi_handle;
 
 /** The id of a node: hub << 20 | index, shown as `7.17`. 0 is nobody. */
@@ -59,6 +60,9 @@ enum {
   GIMI_SYSTEM = 19,        /**< The operating system refused, or memory is out. */
   GIMI_FORKED = 20,       /**< The handle belongs to the parent process: after fork(), join anew. */
   GIMI_NOT_RETAINED = 21, /**< The message was published, but is not kept for later subscribers. */
+  GIMI_BUSY = 22,         /**< Too many requests wait for the program that was asked. */
+  GIMI_FAILED = 23,       /**< The program that was asked says so, with a code of its own. */
+  GIMI_GONE = 24,         /**< The program that was asked has ended, or let the request go. */
   /* Of rights and trust. No call answers these yet. */
   GIMI_NOT_TRUSTED = 32,
   GIMI_NO_RIGHT = 33,

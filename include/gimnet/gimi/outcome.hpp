@@ -54,6 +54,9 @@ enum class Status : std::int32_t {
   system = GIMI_SYSTEM,
   forked = GIMI_FORKED,
   not_retained = GIMI_NOT_RETAINED,
+  busy = GIMI_BUSY,
+  failed = GIMI_FAILED,
+  gone = GIMI_GONE,
 };
 
 /// Why a message did not arrive. gimnet/gimi_types.h explains them.

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstring>
 #include <exception>
+#include <functional>
 #include <memory>
 #include <new>
 #include <string>
@@ -168,6 +169,14 @@ gimi_status with_options(const Options* given, const char* doing, const char* na
   }
   return body(*given);
 }
+
+/// A stream to who accepts a service. `on_place`, which may be null, is called with where that is,
+/// before anybody can say that it moved. Errors: as gimi_sender_to_service().
+using OnPlace = std::function<void(const StreamTable::Stream& stream, const ServicePlace& place)>;
+[[nodiscard]] Outcome<StreamTable::Stream> stream_to_service(Core& core, const std::string& name,
+                                                             const SendOptions& options,
+                                                             Timeout timeout,
+                                                             const OnPlace& on_place = {});
 
 /// Gives an object to the program by a handle.
 template <class ObjectOf, class... Arguments>

@@ -8,6 +8,7 @@
 
 #include "base/clock.hpp"
 #include "base/signals_blocked.hpp"
+#include "client/gimi/open_requests.hpp"
 #include "client/gimi/stream_table.hpp"
 
 namespace gimnet::gimi {
@@ -164,9 +165,10 @@ void Clerk::run() {
     const std::int64_t now = steady_now_ns();
     if (now < tick_at) continue;
     tick_at = now + kTickNs;
-    const bool more = streams_.tick(now);
+    const bool streams = streams_.tick(now);
+    const bool requests = requests_ != nullptr && requests_->tick(now);
     const MutexLock lock(mutex_);
-    if (!more && !hurry_) ticking_ = false;
+    if (!streams && !requests && !hurry_) ticking_ = false;
   }
 }
 

@@ -60,14 +60,17 @@ class AckBook {
   std::map<StreamName, Entry> entries_;
 };
 
+class OpenRequests;
 class StreamTable;
 
 /// A node's own thread: acknowledges what was taken, one ACK for as many messages as came
-/// meanwhile, and lets streams ask for the ACKs that they miss. It sleeps while there is nothing to
-/// do. Thread safety: any thread.
+/// meanwhile, lets streams ask for the ACKs that they miss, and sends requests again. It sleeps
+/// while there is nothing to do. Thread safety: any thread.
 class Clerk {
  public:
-  Clerk(Uplink& uplink, StreamTable& streams) : uplink_(uplink), streams_(streams) {}
+  /// `requests` may be null.
+  Clerk(Uplink& uplink, StreamTable& streams, OpenRequests* requests = nullptr)
+      : uplink_(uplink), streams_(streams), requests_(requests) {}
 
   void start();
   /// Sends the ACKs that are due, and ends the thread. REQUIRES: not from the clerk's own thread.
@@ -100,6 +103,7 @@ class Clerk {
 
   Uplink& uplink_;
   StreamTable& streams_;
+  OpenRequests* const requests_;
   std::thread thread_;
 
   Mutex mutex_;

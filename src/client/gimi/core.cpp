@@ -38,11 +38,15 @@ Core::Core(const NodeOptions& options)
       services_(uplink_, inbox_,
                 [this](const std::string& name, const ServicePlace& place) {
                   streams_.on_service_moved(name, place);
+                  requests_.on_service_moved(name, place);
                 }),
       watches_(uplink_),
-      clerk_(uplink_, streams_),
-      reception_({uplink_, inbox_, streams_, services_, pings_, clerk_, losses_},
-                 options.message_bytes_max) {}
+      requests_(uplink_, [this] { clerk_.attend(true); }),
+      answers_(uplink_),
+      clerk_(uplink_, streams_, &requests_),
+      reception_(
+          {uplink_, inbox_, streams_, services_, pings_, requests_, answers_, clerk_, losses_},
+          options.message_bytes_max) {}
 
 Core::~Core() { close(); }
 
@@ -117,6 +121,8 @@ void Core::end(const Ending& ending) {
   services_.end(ending);
   watches_.end(ending);
   pings_.end(ending);
+  requests_.end(ending);
+  answers_.end(ending);
 }
 
 NodeState Core::state() const {
@@ -235,6 +241,7 @@ void Core::on_connected(const nif_incoming& in) {
   if ((in.flags & NIF_CONNECTED_RESUMED) != 0) return;
   streams_.on_broken({LossReason::connection_lost,
                       "the connection to the hub broke, and what was on its way is lost"});
+  requests_.on_broken();
 }
 
 void Core::on_disconnected(const nif_incoming& in) {

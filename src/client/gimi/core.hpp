@@ -7,9 +7,11 @@
 #include <string_view>
 
 #include "base/mutex.hpp"
+#include "client/gimi/answer_queue.hpp"
 #include "client/gimi/clerk.hpp"
 #include "client/gimi/inbox.hpp"
 #include "client/gimi/loss_tally.hpp"
+#include "client/gimi/open_requests.hpp"
 #include "client/gimi/ping_table.hpp"
 #include "client/gimi/reception.hpp"
 #include "client/gimi/service_table.hpp"
@@ -40,6 +42,8 @@ class Core {
   [[nodiscard]] StreamTable& streams() { return streams_; }
   [[nodiscard]] ServiceTable& services() { return services_; }
   [[nodiscard]] WatchTable& watches() { return watches_; }
+  [[nodiscard]] OpenRequests& requests() { return requests_; }
+  [[nodiscard]] AnswerTable& answers() { return answers_; }
   [[nodiscard]] LostCounts lost() const;
   [[nodiscard]] Outcome<TracedPing> ping(Peer to, Timeout timeout, Lane lane, BytesView echo,
                                          bool traced);
@@ -61,6 +65,8 @@ class Core {
   StreamTable streams_;
   ServiceTable services_;
   WatchTable watches_;
+  OpenRequests requests_;
+  AnswerTable answers_;
   PingTable pings_;
   LossTally losses_;
   mutable std::atomic<std::uint64_t> unreadable_{0};  ///< as NIF counted when it was asked last

@@ -112,7 +112,7 @@ gimi_status gimi_lost(gimi_handle node, gimi_lost_counts* counts) {
     if (!nif::has_size(counts)) return is_null("gimi_lost(): counts, or its struct_size,");
     const LostCounts lost = core.lost();
     const gimi_lost_counts whole{sizeof whole,
-                                 core.inbox().dropped(),
+                                 core.inbox().dropped() + core.requests().dropped(),
                                  lost.incomplete,
                                  lost.too_large,
                                  lost.frames_broken_off,

@@ -28,8 +28,13 @@ gimi_status with_send_options(const gimi_send_options* options, const Body& body
   });
 }
 
+}  // namespace
+
+namespace gimnet::gimi {
+
 Outcome<StreamTable::Stream> stream_to_service(Core& core, const std::string& name,
-                                               const SendOptions& options, Timeout timeout) {
+                                               const SendOptions& options, Timeout timeout,
+                                               const OnPlace& on_place) {
   const auto found = list_services(core.node(), name, timeout);
   if (!found) return found.failure();
   // The listing takes patterns, too: only the service of that very name counts.
@@ -47,11 +52,13 @@ Outcome<StreamTable::Stream> stream_to_service(Core& core, const std::string& na
   if (const auto ended = streams.make_place(name))
     core.services().unfollow(*ended, [&] { return streams.has_service(*ended); });
   return core.services().follow(name, timeout, [&](const ServicePlace& place) {
-    return streams.service_stream(name, place, options);
+    auto stream = streams.service_stream(name, place, options);
+    if (stream && on_place) on_place(*stream, place);
+    return stream;
   });
 }
 
-}  // namespace
+}  // namespace gimnet::gimi
 
 extern "C" {
 

@@ -20,6 +20,8 @@ enum class HandleKind : std::uint8_t {
   queue = 4,
   sender = 5,
   watch = 6,
+  pending = 7,
+  answers = 8,
 };
 
 /// The object that a handle stands for. It lives until its handle is closed and the last call left

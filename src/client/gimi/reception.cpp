@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/endian.hpp"
 #include "client/gimi/loss_tally.hpp"
 #include "client/gimi/message.hpp"
 #include "proto/control/control_message.hpp"
@@ -19,7 +20,7 @@ namespace {
 /// Status of an ERROR about a DATA that is larger than its receiver takes.
 constexpr auto kTooLarge = static_cast<std::uint16_t>(proto::Status::limit);
 /// Of what another node says, so many bytes are kept.
-constexpr std::size_t kPeerWordsMax = 256;
+constexpr std::size_t kPeerWordsMax = GIMI_SENTENCE_BYTES_MAX;
 
 /// Another node's words, fit for a terminal.
 std::string plain_words(std::string_view sentence) {
@@ -102,6 +103,10 @@ nif_verdict Reception::on_message(const nif_incoming& in) {
   switch (view->header.operation) {
     case Operation::data:
       return on_data(in, *view);
+    case Operation::request:
+      return on_request(in, *view);
+    case Operation::reply:
+      return on_reply(in, *view);
     case Operation::ack:
       on_ack(in, *view);
       return NIF_DONE;
@@ -115,10 +120,8 @@ nif_verdict Reception::on_message(const nif_incoming& in) {
       if (view->header.epoch == pings_.epoch())
         pings_.on_pong(view->header.sequence, Peer{in.from}, way_of(in));
       return NIF_DONE;
-    default:
-      inbox_.count_dropped();
-      return NIF_DONE;
   }
+  return NIF_DONE;
 }
 
 nif_verdict Reception::on_data(const nif_incoming& in, const proto::gimi::MessageView& view) {
@@ -208,7 +211,47 @@ nif_verdict Reception::refuse(const nif_incoming& in, const proto::gimi::Message
   return NIF_DONE;
 }
 
+nif_verdict Reception::on_request(const nif_incoming& in, const proto::gimi::MessageView& view) {
+  using proto::gimi::RequestFault;
+  if (!is_for_one(in) || in.from == 0 || view.data.size() < proto::gimi::kRequestPrefix) {
+    losses_.add_unreadable();
+    return NIF_DONE;
+  }
+  proto::gimi::MessageView request = view;
+  request.data = view.data.subspan(proto::gimi::kRequestPrefix);
+  Message message = make_message(in, request, nullptr, reconnects_);
+  const auto queue = answers_.find(message.key());
+  const bool too_large = request.data.size() > message_bytes_max_;
+  if (queue != nullptr && !too_large) {
+    const auto left_ms = load_le<std::uint32_t>(view.data.data());
+    if (queue->on_request(view.header, message, left_ms)) return NIF_KEEP;
+  } else {
+    const RequestFault fault = too_large ? RequestFault::too_large : RequestFault::nobody;
+    const Envelope envelope{
+        in.from, NIF_UNICAST, NIF_POLICY_DEFAULT, message.lane(), message.key(), 0, 0};
+    static_cast<void>(uplink_.transmit(
+        envelope, {view.header.sequence, proto::gimi::Operation::error, 0, 0, view.header.epoch},
+        false, proto::gimi::encode_request_error({fault, 0, ""}), 0));
+  }
+  disown(std::move(message));
+  return NIF_DONE;
+}
+
+nif_verdict Reception::on_reply(const nif_incoming& in, const proto::gimi::MessageView& view) {
+  Message reply = make_message(in, view, nullptr, reconnects_);
+  if (requests_.on_reply(view.header, reply, view.data.size() > message_bytes_max_))
+    return NIF_KEEP;
+  disown(std::move(reply));
+  return NIF_DONE;
+}
+
 void Reception::on_error(const nif_incoming& in, const proto::gimi::MessageView& view) {
+  if (view.header.epoch == requests_.epoch()) {
+    const auto error = proto::gimi::decode_request_error(view.data);
+    if (!error) return losses_.add_unreadable();
+    const std::string sentence = plain_words(error->sentence);
+    return requests_.on_error(view.header, Peer{in.from}, {error->fault, error->code, sentence});
+  }
   const auto failure = proto::gimi::decode_failure(view.data);
   if (!failure || failure->status != kTooLarge) return inbox_.count_dropped();
   streams_.on_refused(
@@ -243,6 +286,11 @@ void Reception::on_report(const nif_incoming& in) {
   const auto header = reported_header(in);
   if (in.reason == NIF_DROP_NOT_RETAINED) return services_.on_not_retained(in.to, header);
   if (!is_for_one(in)) return;
+  if (header && header->operation == proto::gimi::Operation::request) {
+    if (header->epoch == requests_.epoch())
+      requests_.on_report(header->sequence, in.reason, report_words(in.text));
+    return;
+  }
   const bool to_service = in.kind == NIF_SERVICE;
   const StreamName name = stream_of(in, to_service ? 0 : in.to, to_service ? in.to : 0);
   const bool keyed = (in.flags & NIF_FLAG_KEYED) != 0;

@@ -3,9 +3,11 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "client/gimi/answer_queue.hpp"
 #include "client/gimi/clerk.hpp"
 #include "client/gimi/inbox.hpp"
 #include "client/gimi/loss_tally.hpp"
+#include "client/gimi/open_requests.hpp"
 #include "client/gimi/ping_table.hpp"
 #include "client/gimi/received_streams.hpp"
 #include "client/gimi/service_table.hpp"
@@ -33,6 +35,8 @@ class Reception {
     StreamTable& streams;
     ServiceTable& services;
     PingTable& pings;
+    OpenRequests& requests;
+    AnswerTable& answers;
     Clerk& clerk;
     LossTally& losses;
   };
@@ -43,6 +47,8 @@ class Reception {
         streams_(parts.streams),
         services_(parts.services),
         pings_(parts.pings),
+        requests_(parts.requests),
+        answers_(parts.answers),
         clerk_(parts.clerk),
         losses_(parts.losses),
         message_bytes_max_(message_bytes_max) {}
@@ -55,6 +61,9 @@ class Reception {
 
  private:
   [[nodiscard]] nif_verdict on_data(const nif_incoming& in, const proto::gimi::MessageView& view);
+  [[nodiscard]] nif_verdict on_request(const nif_incoming& in,
+                                       const proto::gimi::MessageView& view);
+  [[nodiscard]] nif_verdict on_reply(const nif_incoming& in, const proto::gimi::MessageView& view);
   /// A message without a GIMI header.
   [[nodiscard]] nif_verdict on_plain(const nif_incoming& in);
   [[nodiscard]] nif_verdict on_group_data(const nif_incoming& in,
@@ -72,6 +81,8 @@ class Reception {
   StreamTable& streams_;
   ServiceTable& services_;
   PingTable& pings_;
+  OpenRequests& requests_;
+  AnswerTable& answers_;
   Clerk& clerk_;
   LossTally& losses_;
   const std::size_t message_bytes_max_;

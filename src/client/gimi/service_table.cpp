@@ -111,6 +111,12 @@ void ServiceTable::withdraw(PublishedService& service) {
   static_cast<void>(nif_withdraw_service(uplink_.node(), service.name().c_str(), kLeaveTimeoutMs));
 }
 
+void ServiceTable::withdraw_accepted(const std::string& name) {
+  const MutexLock turn(asking_);
+  own_names_.erase(name);
+  static_cast<void>(nif_withdraw_service(uplink_.node(), name.c_str(), kLeaveTimeoutMs));
+}
+
 ServiceTable::Subscribed ServiceTable::entry(const std::string& full_name,
                                              const QueueOptions& options) {
   const auto place = subscribed_.find(full_name);
@@ -118,11 +124,6 @@ ServiceTable::Subscribed ServiceTable::entry(const std::string& full_name,
   auto service = std::make_shared<SubscribedService>(full_name, inbox_, options);
   if (end_) service->end(end_);
   return subscribed_.emplace(full_name, std::move(service)).first->second;
-}
-
-std::size_t ServiceTable::subscriptions() {
-  const MutexLock lock(mutex_);
-  return subscribed_.size();
 }
 
 /// A former group leads to the service until as many younger ones came: the event that a provider

@@ -40,6 +40,8 @@ class ServiceTable {
                                      const AcceptOptions& options, Timeout timeout)
       GIMNET_EXCLUDES(asking_, mutex_);
   void withdraw(PublishedService& service) GIMNET_EXCLUDES(asking_, mutex_);
+  /// Ends a service that accept() lists; `name` as there.
+  void withdraw_accepted(const std::string& name) GIMNET_EXCLUDES(asking_);
 
   using Subscribed = std::shared_ptr<SubscribedService>;
   [[nodiscard]] Outcome<Subscribed> subscribe(const std::string& full_name,
@@ -48,7 +50,10 @@ class ServiceTable {
   /// A handle that subscribe() counted was dropped; with the last one the subscription ends.
   void unsubscribe(const Subscribed& service) GIMNET_EXCLUDES(asking_, mutex_);
   /// Services that are subscribed or sent to now.
-  [[nodiscard]] std::size_t subscriptions() GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] std::size_t subscriptions() GIMNET_EXCLUDES(mutex_) {
+    const MutexLock lock(mutex_);
+    return subscribed_.size();
+  }
 
   /// Begins a stream to a service: `make` is called once with where it is; what changes then comes
   /// to on_moved(), until unfollow().

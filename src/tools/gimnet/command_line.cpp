@@ -164,7 +164,9 @@ std::string contradiction(const ToolOptions& options) {
            "' has a character that no name has; in patterns `*` is one part, `**` any number";
   }
   const bool names_service = options.command == Command::pub || options.command == Command::echo ||
-                             options.command == Command::hz || options.command == Command::bw;
+                             options.command == Command::hz || options.command == Command::bw ||
+                             options.command == Command::request ||
+                             options.command == Command::answer;
   if (names_service && options.target.find_first_of("/*") == std::string::npos) {
     return "'" + options.target + "' is no full name of a service: write NODE/SERVICE";
   }
@@ -174,7 +176,10 @@ std::string contradiction(const ToolOptions& options) {
     return "'" + options.target +
            "' matches no service: full names are NODE/SERVICE, so write NODE/*, or ** for all";
   }
-  if (options.command == Command::pub) {
+  const bool names_one = options.command == Command::request || options.command == Command::answer;
+  if (names_one && is_pattern(options.target))
+    return "'" + options.target + "' is a pattern: name one service, NODE/SERVICE";
+  if (options.command == Command::pub || names_one) {
     const auto slash = options.target.rfind('/');
     if (slash == std::string::npos || slash == 0 || slash + 1 == options.target.size()) {
       return "'" + options.target + "' is no full name of a service: write NODE/SERVICE";

@@ -187,6 +187,31 @@ void add_echo(CLI::App& app, ToolOptions& options) {
   add_printing(echo, options);
 }
 
+void add_requests(CLI::App& app, ToolOptions& options) {
+  CLI::App& request = *app.add_subcommand("request", help::kRequestAbout);
+  request.add_option("service", options.target, "full name: node/service")
+      ->required()
+      ->check(not_empty());
+  CLI::Option* const text =
+      request.add_option("text", options.text, "what to ask, default nothing");
+  request.add_option("--file", options.file, "ask with the content of this file")
+      ->check(not_empty())
+      ->excludes(text);
+  request
+      .add_option("--timeout", options.timeout_s,
+                  "seconds to wait for the answer, 0.001 to 3600, default 1")
+      ->transform(within(0.001, 3600.0));
+  request.add_flag("--raw", options.raw, "print the answer as it is, and a newline");
+  add_lane(request, options);
+  CLI::App& answer = *app.add_subcommand("answer", help::kAnswerAbout);
+  answer.add_option("service", options.target, "full name: node/service")
+      ->required()
+      ->check(not_empty());
+  answer.add_flag("--echo", options.echo_back, "answer with what was asked")->required();
+  answer.add_option("-n,--count", options.count, "end after that many requests, 1 or more")
+      ->transform(within(std::uint64_t{1}, std::uint64_t{1} << 62));
+}
+
 void add_meter(CLI::App& app, const char* name, const char* about, ToolOptions& options) {
   CLI::App& meter = *app.add_subcommand(name, about);
   meter
@@ -283,6 +308,7 @@ void add_commands(CLI::App& app, ToolOptions& options) {
   add_recv(app, options);
   add_pub(app, options);
   add_echo(app, options);
+  add_requests(app, options);
   add_meter(app, "hz", help::kHzAbout, options);
   add_meter(app, "bw", help::kBwAbout, options);
   add_pings(app, "ping", help::kPingAbout, options);

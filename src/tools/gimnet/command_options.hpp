@@ -37,6 +37,7 @@ Examples:
   gimnet send B < lines                     send each line to B, and wait until B has them all
   gimnet pub robot/odom < lines             publish each line as robot/odom
   gimnet echo robot/odom -n 10              print ten messages of robot/odom
+  gimnet request calc/add '1 2'             ask a service, and print its answer
   gimnet hz 'robot/*'                       how often do its services send, and how evenly?
   gimnet ping B                             how far away is B?
   gimnet watch                              who comes and goes?
@@ -100,6 +101,25 @@ Examples:
 
 By full name nothing is missed of a service that begins later; by pattern what is published before the hub has told of
 it: `gimnet pub --wait 1` waits for that.
+)";
+
+inline constexpr const char* kRequestAbout =
+    R"(Ask a service that answers requests, and print its answer.
+
+Examples:
+  gimnet request calc/add '1 2'             a request of that text
+  gimnet request map/part --file area.bin --raw > part.bin
+  gimnet request calc/add '1 2' --timeout 0.5 --json | jq .text
+
+Without a text or a file the request is empty. Ends with 1 if the other program answers with an error, whose words it
+prints, 4 if nobody answers that service, 5 if there was no answer in time.
+)";
+
+inline constexpr const char* kAnswerAbout = R"(Answer the requests to a service with what they say.
+
+Examples:
+  gimnet answer B/mirror --echo             the node B answers mirror, until Ctrl-C
+  gimnet answer B/mirror --echo -n 10       and ends after ten requests
 )";
 
 inline constexpr const char* kHzAbout = R"(Measure how often services send, and how evenly.
@@ -211,25 +231,14 @@ Examples:
 namespace gimnet::tool {
 
 /// All commands, by the words that name them.
-inline constexpr std::array<std::pair<std::string_view, Command>, 18> kCommands{
-    {{"send", Command::send},
-     {"recv", Command::recv},
-     {"pub", Command::pub},
-     {"echo", Command::echo},
-     {"hz", Command::hz},
-     {"bw", Command::bw},
-     {"ping", Command::ping},
-     {"trace", Command::trace},
-     {"nodes", Command::nodes},
-     {"services", Command::services},
-     {"watch", Command::watch},
-     {"status", Command::status},
-     {"hubs", Command::hubs},
-     {"links", Command::links},
-     {"routes", Command::routes},
-     {"graph", Command::graph},
-     {"impair", Command::impair},
-     {"ctl", Command::ctl}}};
+inline constexpr std::array<std::pair<std::string_view, Command>, 20> kCommands{
+    {{"send", Command::send},     {"recv", Command::recv},       {"pub", Command::pub},
+     {"echo", Command::echo},     {"request", Command::request}, {"answer", Command::answer},
+     {"hz", Command::hz},         {"bw", Command::bw},           {"ping", Command::ping},
+     {"trace", Command::trace},   {"nodes", Command::nodes},     {"services", Command::services},
+     {"watch", Command::watch},   {"status", Command::status},   {"hubs", Command::hubs},
+     {"links", Command::links},   {"routes", Command::routes},   {"graph", Command::graph},
+     {"impair", Command::impair}, {"ctl", Command::ctl}}};
 
 /// Declares every command and option; parsing writes to `options`, which must outlive `app`. Each
 /// option's description says its unit, range and default: it is what a wrong value is answered

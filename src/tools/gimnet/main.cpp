@@ -24,6 +24,10 @@ ExitCode run(const ToolOptions& options) {
       return run_pub(session);
     case Command::echo:
       return run_echo(session);
+    case Command::request:
+      return run_request(session);
+    case Command::answer:
+      return run_answer(session);
     case Command::hz:
       return run_hz(session);
     case Command::bw:

@@ -17,6 +17,8 @@ enum class Command : std::uint8_t {
   recv,
   pub,
   echo,
+  request,
+  answer,
   hz,
   bw,
   ping,
@@ -72,6 +74,8 @@ struct ToolOptions {
   std::uint32_t window = 1;  ///< of delivery sync
   bool retain = false;
   bool stay = false;
+  std::string text;  ///< of a request
+  bool echo_back = false;
   PaceOptions pace;  ///< of what is subscribed
   Lane lane = Lane::normal;
   MessageKey key;

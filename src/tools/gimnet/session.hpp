@@ -134,6 +134,8 @@ void say(const std::string& sentence);
 [[nodiscard]] ExitCode run_recv(ToolSession& session);
 [[nodiscard]] ExitCode run_pub(ToolSession& session);
 [[nodiscard]] ExitCode run_echo(ToolSession& session);
+[[nodiscard]] ExitCode run_request(ToolSession& session);
+[[nodiscard]] ExitCode run_answer(ToolSession& session);
 [[nodiscard]] ExitCode run_hz(ToolSession& session);
 [[nodiscard]] ExitCode run_bw(ToolSession& session);
 [[nodiscard]] ExitCode run_ping(ToolSession& session);

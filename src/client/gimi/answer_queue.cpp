@@ -1,0 +1,179 @@
+#include "client/gimi/answer_queue.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "base/clock.hpp"
+#include "client/gimi/message.hpp"
+
+namespace gimnet::gimi {
+namespace {
+
+using proto::gimi::Operation;
+using proto::gimi::RequestFault;
+
+std::uint64_t name_of(const proto::gimi::MessageHeader& header) {
+  return (std::uint64_t{header.epoch} << 32) | header.sequence;
+}
+
+}  // namespace
+
+Outcome<TakenRequest> AnswerQueue::receive(Timeout timeout) {
+  const std::int64_t deadline = deadline_after(timeout);
+  const MutexLock lock(mutex_);
+  for (;;) {
+    while (waiting_.empty()) {
+      if (end_) return end_.failure("take a request to " + service_);
+      if (is_over(deadline))
+        return Failure{Status::timeout, "no request came to " + service_ + " in the time given"};
+      static_cast<void>(filled_.wait_until(mutex_, deadline));
+    }
+    Waiting next = std::move(waiting_.front());
+    waiting_.pop_front();
+    if (!is_over(next.deadline_ns)) {
+      const std::int64_t left_ms =
+          next.deadline_ns == INT64_MAX ? -1 : (next.deadline_ns - steady_now_ns()) / 1'000'000;
+      return TakenRequest{std::move(next.message), next.name, left_ms};
+    }
+    const auto way = open_.extract(next.name);
+    if (!way.empty()) refuse(way.mapped(), next.name, RequestFault::late);
+  }
+}
+
+nif_status AnswerQueue::send(const Way& way, std::uint64_t name, Operation operation,
+                             BytesView data, std::int32_t timeout_ms) const {
+  const Envelope envelope{way.to.id, NIF_UNICAST, NIF_POLICY_DEFAULT, way.lane, way.key, 0, 0};
+  return uplink_.transmit(
+      envelope,
+      {static_cast<std::uint32_t>(name), operation, 0, 0, static_cast<std::uint32_t>(name >> 32)},
+      false, data, timeout_ms);
+}
+
+/// Does not wait: if the way is full, the time of the request tells.
+void AnswerQueue::refuse(const Way& way, std::uint64_t name, RequestFault fault) const {
+  static_cast<void>(
+      send(way, name, Operation::error, proto::gimi::encode_request_error({fault, 0, ""}), 0));
+}
+
+Outcome<void> AnswerQueue::answer(std::uint64_t name, Operation operation, BytesView data,
+                                  Timeout timeout) {
+  Way way;
+  {
+    const MutexLock lock(mutex_);
+    const auto open = open_.find(name);
+    if (open == open_.end()) {
+      return Failure{Status::closed, "cannot answer the request to " + service_ +
+                                         ": it was answered already, or its service has ended"};
+    }
+    way = open->second;
+    open_.erase(open);
+    keep({name, operation, {data.span().begin(), data.span().end()}});
+  }
+  const nif_status status = send(way, name, operation, data, nif_timeout(timeout));
+  if (status == NIF_OK) return {};
+  return failure_of(status, "answer the request to " + service_);
+}
+
+Outcome<void> AnswerQueue::reply(std::uint64_t name, BytesView data, Timeout timeout) {
+  return answer(name, Operation::reply, data, timeout);
+}
+
+Outcome<void> AnswerQueue::fail(std::uint64_t name, const proto::gimi::RequestError& error) {
+  const auto data = proto::gimi::encode_request_error(error);
+  return answer(name, Operation::error, data, Timeout{kLeaveTimeoutMs});
+}
+
+void AnswerQueue::keep(Answer answer) {
+  if (answer.data.size() > kAnswerBytesMax) return;
+  answer_bytes_ += answer.data.size();
+  answers_.push_back(std::move(answer));
+  while (answers_.size() > kAnswersMax || answer_bytes_ > kAnswerBytesMax) {
+    answer_bytes_ -= answers_.front().data.size();
+    answers_.pop_front();
+  }
+}
+
+void AnswerQueue::remember(std::uint64_t name) {
+  names_.push_back(name);
+  if (names_.size() > kNamesMax) names_.pop_front();
+}
+
+bool AnswerQueue::on_request(const proto::gimi::MessageHeader& header, Message& message,
+                             std::uint32_t left_ms) {
+  const std::uint64_t name = name_of(header);
+  const Way way{message.from(), message.lane(), message.key()};
+  const bool again = header.has(proto::gimi::kFlagAgain);
+  const MutexLock lock(mutex_);
+  if (end_) {
+    refuse(way, name, RequestFault::withdrawn);
+    return false;
+  }
+  if (again) {
+    if (const auto open = open_.find(name); open != open_.end()) {
+      open->second = way;  // the asking node may have another id now
+      return false;
+    }
+    const auto kept = std::ranges::find(answers_, name, &Answer::name);
+    if (kept != answers_.end()) {
+      static_cast<void>(send(way, name, kept->operation, kept->data, 0));
+      return false;
+    }
+    const bool may_have_come =
+        names_.size() == kNamesMax || std::ranges::find(names_, name) != names_.end();
+    if (may_have_come && !header.has(proto::gimi::kFlagRepeat)) {
+      refuse(way, name, RequestFault::unknown);
+      return false;
+    }
+  }
+  if (waiting_.size() >= kWaitingMax) {
+    refuse(way, name, RequestFault::busy);
+    return false;
+  }
+  remember(name);
+  open_.insert_or_assign(name, way);
+  const bool limited = left_ms != proto::gimi::kNoDeadline;
+  const std::int64_t deadline =
+      limited ? steady_now_ns() + std::int64_t{left_ms} * 1'000'000 : INT64_MAX;
+  waiting_.push_back({std::move(message), name, deadline});
+  filled_.notify_one();
+  return true;
+}
+
+void AnswerQueue::end(const Ending& ending) {
+  const MutexLock lock(mutex_);
+  end_ = ending;
+  for (const Waiting& waiting : waiting_) {
+    const auto way = open_.extract(waiting.name);
+    if (!way.empty()) refuse(way.mapped(), waiting.name, RequestFault::withdrawn);
+  }
+  waiting_.clear();
+  filled_.notify_all();
+}
+
+AnswerTable::Added AnswerTable::add(const std::string& full_name) {
+  auto queue = std::make_shared<AnswerQueue>(uplink_, full_name);
+  const MutexLock lock(mutex_);
+  if (end_) queue->end(end_);
+  const MessageKey key{proto::gimi::kRequestType, next_++};
+  queues_.emplace(key.instance, queue);
+  return {queue, key};
+}
+
+void AnswerTable::remove(MessageKey key) {
+  const MutexLock lock(mutex_);
+  queues_.erase(key.instance);
+}
+
+std::shared_ptr<AnswerQueue> AnswerTable::find(MessageKey key) {
+  const MutexLock lock(mutex_);
+  const auto found = queues_.find(key.instance);
+  return key.type == proto::gimi::kRequestType && found != queues_.end() ? found->second : nullptr;
+}
+
+void AnswerTable::end(const Ending& ending) {
+  const MutexLock lock(mutex_);
+  end_ = ending;
+  for (const auto& [instance, queue] : queues_) queue->end(ending);
+}
+
+}  // namespace gimnet::gimi

@@ -1,0 +1,123 @@
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "base/mutex.hpp"
+#include "client/gimi/ending.hpp"
+#include "client/gimi/uplink.hpp"
+#include "gimnet/gimi/message.hpp"
+#include "gimnet/gimi/outcome.hpp"
+#include "proto/gimi/request.hpp"
+
+namespace gimnet::gimi {
+
+/// A request that the program takes.
+struct TakenRequest {
+  Message message;           ///< its data are those of the program
+  std::uint64_t name = 0;    ///< epoch and sequence
+  std::int64_t left_ms = 0;  ///< until nobody waits any more; -1: no limit
+};
+
+/// The requests to one own service that answers, and what became of the last ones. Thread safety:
+/// any thread; on_request() from the library's. Limits: kWaitingMax, kNamesMax, kAnswersMax and
+/// kAnswerBytesMax.
+class AnswerQueue {
+ public:
+  /// Requests that wait for the program. Further ones are refused `busy`.
+  static constexpr std::size_t kWaitingMax = 64;
+  /// Requests of which it is known that they came.
+  static constexpr std::size_t kNamesMax = 1024;
+  /// Answers that are kept, to be sent again to who asks again.
+  static constexpr std::size_t kAnswersMax = 64;
+  static constexpr std::size_t kAnswerBytesMax = std::size_t{1} << 20;
+
+  AnswerQueue(Uplink& uplink, std::string service)
+      : uplink_(uplink), service_(std::move(service)) {}
+  [[nodiscard]] const std::string& service() const { return service_; }
+
+  /// Takes the oldest request whose time is not over. Errors: timeout, closed.
+  [[nodiscard]] Outcome<TakenRequest> receive(Timeout timeout) GIMNET_EXCLUDES(mutex_);
+  /// Answers a request that was taken: once. Errors: closed (it has been answered, or the node
+  /// was closed), and those of sending.
+  [[nodiscard]] Outcome<void> reply(std::uint64_t name, BytesView data, Timeout timeout)
+      GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] Outcome<void> fail(std::uint64_t name, const proto::gimi::RequestError& error)
+      GIMNET_EXCLUDES(mutex_);
+
+  /// True: it keeps the message, with its storage. `left_ms`: as the request says.
+  [[nodiscard]] bool on_request(const proto::gimi::MessageHeader& header, Message& message,
+                                std::uint32_t left_ms) GIMNET_EXCLUDES(mutex_);
+  /// No program takes requests any more: those that wait are refused.
+  void end(const Ending& ending) GIMNET_EXCLUDES(mutex_);
+
+ private:
+  struct Waiting {
+    Message message;
+    std::uint64_t name = 0;
+    std::int64_t deadline_ns = 0;
+  };
+  /// The way of the answer.
+  struct Way {
+    Peer to;
+    Lane lane = Lane::normal;
+    MessageKey key;
+  };
+  struct Answer {
+    std::uint64_t name = 0;
+    proto::gimi::Operation operation{};
+    std::vector<std::byte> data;
+  };
+  [[nodiscard]] nif_status send(const Way& way, std::uint64_t name,
+                                proto::gimi::Operation operation, BytesView data,
+                                std::int32_t timeout_ms) const;
+  void refuse(const Way& way, std::uint64_t name, proto::gimi::RequestFault fault) const;
+  [[nodiscard]] Outcome<void> answer(std::uint64_t name, proto::gimi::Operation operation,
+                                     BytesView data, Timeout timeout) GIMNET_EXCLUDES(mutex_);
+  void keep(Answer answer) GIMNET_REQUIRES(mutex_);
+  void remember(std::uint64_t name) GIMNET_REQUIRES(mutex_);
+
+  Uplink& uplink_;
+  const std::string service_;
+
+  Mutex mutex_;
+  Condition filled_;
+  std::deque<Waiting> waiting_ GIMNET_GUARDED_BY(mutex_);        ///< Limit: kWaitingMax
+  std::map<std::uint64_t, Way> open_ GIMNET_GUARDED_BY(mutex_);  ///< not answered
+  std::deque<std::uint64_t> names_ GIMNET_GUARDED_BY(mutex_);    ///< Limit: kNamesMax
+  std::deque<Answer> answers_ GIMNET_GUARDED_BY(mutex_);         ///< Limit: kAnswersMax
+  std::size_t answer_bytes_ GIMNET_GUARDED_BY(mutex_) = 0;
+  Ending end_ GIMNET_GUARDED_BY(mutex_);
+};
+
+/// The services of a node that answer, by the instance of their key. Thread safety: any thread.
+/// Limits: those of the hub.
+class AnswerTable {
+ public:
+  explicit AnswerTable(Uplink& uplink) : uplink_(uplink) {}
+
+  struct Added {
+    std::shared_ptr<AnswerQueue> queue;
+    MessageKey key;
+  };
+  [[nodiscard]] Added add(const std::string& full_name) GIMNET_EXCLUDES(mutex_);
+  void remove(MessageKey key) GIMNET_EXCLUDES(mutex_);
+  /// Null: no such service.
+  [[nodiscard]] std::shared_ptr<AnswerQueue> find(MessageKey key) GIMNET_EXCLUDES(mutex_);
+  void end(const Ending& ending) GIMNET_EXCLUDES(mutex_);
+
+ private:
+  Uplink& uplink_;
+  Mutex mutex_;
+  std::map<std::uint32_t, std::shared_ptr<AnswerQueue>> queues_ GIMNET_GUARDED_BY(mutex_);
+  std::uint32_t next_ GIMNET_GUARDED_BY(mutex_) = 1;
+  Ending end_ GIMNET_GUARDED_BY(mutex_);
+};
+
+}  // namespace gimnet::gimi

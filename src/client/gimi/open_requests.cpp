@@ -1,0 +1,318 @@
+#include "client/gimi/open_requests.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "base/clock.hpp"
+#include "base/endian.hpp"
+#include "proto/frame/report.hpp"
+
+namespace gimnet::gimi {
+namespace {
+
+using proto::gimi::RequestFault;
+
+Ended without_reply(Status status, Ran ran, std::string sentence) {
+  return {status, std::move(sentence), ran, 0, {}};
+}
+
+Ended reply_of(const proto::gimi::RequestError& error, const std::string& service) {
+  const std::string words = service + ": ";
+  switch (error.fault) {
+    case RequestFault::failed:
+      return {Status::failed, words + std::string(error.sentence), Ran::yes, error.code, {}};
+    case RequestFault::busy:
+      return without_reply(Status::busy, Ran::no, words + "too many requests wait there");
+    case RequestFault::late:
+      return without_reply(Status::timeout, Ran::no, words + "the request came too late");
+    case RequestFault::nobody:
+    case RequestFault::withdrawn:
+      return without_reply(Status::not_found, Ran::no, words + "nobody answers there any more");
+    case RequestFault::too_large:
+      return without_reply(Status::too_large, Ran::no,
+                           words + "the request is larger than it takes");
+    case RequestFault::let_go:
+      return without_reply(Status::gone, Ran::maybe,
+                           words + "the program took the request and did not answer it");
+    case RequestFault::unknown:
+      break;
+  }
+  return without_reply(Status::gone, Ran::maybe,
+                       words + "nobody there knows what became of the request");
+}
+
+/// The way there may be back soon.
+bool may_come_back(std::uint32_t reason) {
+  switch (static_cast<proto::DropReason>(reason)) {
+    case proto::DropReason::no_such_node:
+    case proto::DropReason::no_such_group:
+    case proto::DropReason::no_route:
+    case proto::DropReason::away:
+      return true;
+    default:
+      return false;
+  }
+}
+
+}  // namespace
+
+bool OpenRequests::knows(const std::string& service) {
+  const MutexLock lock(mutex_);
+  const auto found = services_.find(service);
+  if (found == services_.end() || found->second.place.destination() == 0) return false;
+  found->second.asked = ++asked_;
+  return true;
+}
+
+void OpenRequests::learn(const std::string& service, StreamTable::Stream stream,
+                         const ServicePlace& place) {
+  const MutexLock lock(mutex_);
+  services_.insert_or_assign(service, Service{std::move(stream), place, ++asked_});
+  if (services_.size() <= kServicesMax) return;
+  services_.erase(
+      std::ranges::min_element(services_, {}, [](const auto& each) { return each.second.asked; }));
+}
+
+Outcome<std::uint32_t> OpenRequests::open(const std::string& service, BytesView data,
+                                          std::int64_t deadline_ns, const RequestOptions& options) {
+  std::optional<Sending> sending;
+  std::uint32_t number = 0;
+  {
+    const MutexLock lock(mutex_);
+    if (end_) return end_.failure("ask " + service);
+    if (open_.size() >= kOpenMax) {
+      return Failure{Status::limit, "cannot ask " + service + ": " + std::to_string(kOpenMax) +
+                                        " requests of this node are open"};
+    }
+    while (next_ == 0 || open_.contains(next_)) ++next_;
+    number = next_++;
+    Open& made = open_[number];
+    made.service = service;
+    made.message.resize(proto::gimi::kRequestPrefix + data.size());
+    std::ranges::copy(data.span(), made.message.begin() + proto::gimi::kRequestPrefix);
+    made.lane = options.lane;
+    made.repeat = options.repeat;
+    made.begun_ns = steady_now_ns();
+    made.deadline_ns = deadline_ns;
+    sending = prepare(number, made, made.begun_ns);
+    if (!sending) made.again_ns = made.begun_ns + kRetryNs;
+  }
+  if (sending) {
+    transmit(number, *sending, nif_timeout_until(deadline_ns));
+  } else {
+    attend_();
+  }
+  return number;
+}
+
+std::optional<OpenRequests::Sending> OpenRequests::prepare(std::uint32_t number, Open& open,
+                                                           std::int64_t now_ns) {
+  const auto service = services_.find(open.service);
+  if (service == services_.end() || service->second.place.destination() == 0) return std::nullopt;
+  const ServicePlace& place = service->second.place;
+  std::uint32_t left_ms = proto::gimi::kNoDeadline;
+  if (open.deadline_ns != INT64_MAX) {
+    const std::int64_t left = std::max<std::int64_t>(open.deadline_ns - now_ns, 0) / 1'000'000;
+    left_ms = static_cast<std::uint32_t>(
+        std::min<std::int64_t>(left, proto::gimi::kNoDeadline - std::int64_t{1}));
+  }
+  store_le(open.message.data(), left_ms);
+  std::uint8_t flags = open.may_have_run ? proto::gimi::kFlagAgain : 0;
+  if (open.repeat) flags |= proto::gimi::kFlagRepeat;
+  open.provider = place.provider;
+  open.session = place.session;
+  open.again_ns = 0;
+  open.may_have_run = true;  // from the moment at which it is given away
+  return Sending{
+      {place.group, NIF_SERVICE, NIF_POLICY_DEFAULT, open.lane, place.key, 0, NIF_FLAG_REPORT},
+      {number, proto::gimi::Operation::request, flags, 0, epoch_},
+      open.message};
+}
+
+void OpenRequests::transmit(std::uint32_t number, const Sending& sending, std::int32_t timeout_ms) {
+  const nif_status status =
+      uplink_.transmit(sending.envelope, sending.header, false, sending.message, timeout_ms);
+  if (status == NIF_OK) return;
+  Failure failure = failure_of(status, "send a request");
+  const bool again = sending.header.has(proto::gimi::kFlagAgain);
+  {
+    const MutexLock lock(mutex_);
+    const auto found = open_.find(number);
+    if (found == open_.end() || found->second.reply) return;
+    Open& open = found->second;
+    open.may_have_run = again;
+    if (status == NIF_TIMEOUT && !is_over(open.deadline_ns)) {
+      open.again_ns = steady_now_ns() + kRetryNs;  // the hub has paused the way
+    } else {
+      finish(open, without_reply(failure.status, again ? Ran::maybe : Ran::no,
+                                 std::move(failure.sentence)));
+      return;
+    }
+  }
+  attend_();
+}
+
+void OpenRequests::finish(Open& open, Ended reply) {
+  open.again_ns = 0;
+  open.reply = std::move(reply);
+  ended_.notify_all();
+}
+
+void OpenRequests::retry(Open& open, Ended otherwise, std::int64_t until_ns) {
+  const std::int64_t now = steady_now_ns();
+  if (now >= until_ns) return finish(open, std::move(otherwise));
+  open.may_have_run = false;
+  open.again_ns = now + kRetryNs;
+}
+
+std::optional<Ended> OpenRequests::wait(std::uint32_t number, std::int64_t until_ns,
+                                        const std::atomic<bool>* left) {
+  const MutexLock lock(mutex_);
+  for (;;) {
+    const auto found = open_.find(number);
+    if (found == open_.end()) return without_reply(Status::closed, Ran::maybe, "it has ended");
+    Open& open = found->second;
+    if (!open.reply && is_over(open.deadline_ns)) {
+      open.reply = without_reply(Status::timeout, open.may_have_run ? Ran::maybe : Ran::no,
+                                 open.service + " did not answer within the time given");
+    }
+    if (open.reply) {
+      std::optional<Ended> reply = std::move(open.reply);
+      open_.erase(found);
+      return reply;
+    }
+    if ((left != nullptr && *left) || is_over(until_ns)) return std::nullopt;
+    static_cast<void>(ended_.wait_until(mutex_, std::min(until_ns, open.deadline_ns)));
+  }
+}
+
+void OpenRequests::cancel(std::uint32_t number) {
+  const MutexLock lock(mutex_);
+  open_.erase(number);
+}
+
+void OpenRequests::pause(std::int64_t until_ns) {
+  const MutexLock lock(mutex_);
+  static_cast<void>(ended_.wait_until(mutex_, until_ns));
+}
+
+void OpenRequests::leave(std::atomic<bool>& left) {
+  const MutexLock lock(mutex_);
+  left = true;
+  ended_.notify_all();
+}
+
+OpenRequests::Open* OpenRequests::find(const proto::gimi::MessageHeader& header, Peer from) {
+  const auto found = header.epoch == epoch_ ? open_.find(header.sequence) : open_.end();
+  if (found != open_.end() && !found->second.reply && found->second.provider == from.id)
+    return &found->second;
+  ++dropped_;
+  return nullptr;
+}
+
+bool OpenRequests::on_reply(const proto::gimi::MessageHeader& header, Message& reply,
+                            bool too_large) {
+  const MutexLock lock(mutex_);
+  Open* const open = find(header, reply.from());
+  if (open == nullptr) return false;
+  if (too_large) {
+    finish(*open, without_reply(Status::too_large, Ran::maybe,
+                                open->service + ": the reply is larger than this node takes"));
+    return false;
+  }
+  finish(*open, Ended{Status::ok, "", Ran::yes, 0, std::move(reply)});
+  return true;
+}
+
+void OpenRequests::on_error(const proto::gimi::MessageHeader& header, Peer from,
+                            const proto::gimi::RequestError& error) {
+  const MutexLock lock(mutex_);
+  Open* const open = find(header, from);
+  if (open != nullptr) finish(*open, reply_of(error, open->service));
+}
+
+void OpenRequests::on_report(std::uint32_t sequence, std::uint32_t reason,
+                             const std::string& words) {
+  {
+    const MutexLock lock(mutex_);
+    const auto found = open_.find(sequence);
+    if (found == open_.end() || found->second.reply) return;
+    Open& open = found->second;
+    const bool unsure = reason == NIF_DROP_LINK_UNSURE;
+    Ended otherwise = without_reply(Status::not_delivered, unsure ? Ran::maybe : Ran::no,
+                                    open.service + ": " + words);
+    if (!may_come_back(reason)) return finish(open, std::move(otherwise));
+    const bool away = reason == NIF_DROP_AWAY;
+    retry(open, std::move(otherwise), away ? open.deadline_ns : open.begun_ns + kRetryForNs);
+  }
+  attend_();
+}
+
+void OpenRequests::on_service_moved(const std::string& service, const ServicePlace& place) {
+  const MutexLock lock(mutex_);
+  const auto known = services_.find(service);
+  if (known == services_.end()) return;
+  known->second.place = place;
+  for (auto& [number, open] : open_) {
+    if (open.service != service || open.reply || !open.may_have_run) continue;
+    if (place.destination() != 0 && place.provider == open.provider &&
+        place.session == open.session) {
+      continue;
+    }
+    finish(open, without_reply(Status::gone, Ran::maybe,
+                               service + ": the program that was asked has gone"));
+  }
+}
+
+void OpenRequests::on_broken() {
+  {
+    const MutexLock lock(mutex_);
+    for (auto& [number, open] : open_) {
+      if (!open.reply && open.again_ns == 0) open.again_ns = steady_now_ns() + kRetryNs;
+    }
+    if (open_.empty()) return;
+  }
+  attend_();
+}
+
+void OpenRequests::end(const Ending& ending) {
+  const MutexLock lock(mutex_);
+  end_ = ending;
+  for (auto& [number, open] : open_) {
+    if (open.reply) continue;
+    const Failure failure = ending.failure("ask " + open.service);
+    finish(open, without_reply(failure.status, open.may_have_run ? Ran::maybe : Ran::no,
+                               failure.sentence));
+  }
+  services_.clear();
+  ended_.notify_all();
+}
+
+bool OpenRequests::tick(std::int64_t now_ns) {
+  std::vector<std::pair<std::uint32_t, Sending>> due;
+  bool more = false;
+  {
+    const MutexLock lock(mutex_);
+    for (auto& [number, open] : open_) {
+      if (open.again_ns == 0) continue;
+      more = true;
+      if (open.again_ns > now_ns) continue;
+      if (auto sending = prepare(number, open, now_ns)) {
+        due.emplace_back(number, std::move(*sending));
+      } else if (!open.may_have_run && now_ns - open.begun_ns >= kRetryForNs) {
+        finish(open, without_reply(Status::not_found, Ran::no, open.service + ": nobody answers"));
+      } else {
+        open.again_ns = now_ns + kRetryNs;
+      }
+    }
+  }
+  for (const auto& [number, sending] : due) transmit(number, sending, 0);
+  return more;
+}
+
+std::uint64_t OpenRequests::dropped() {
+  const MutexLock lock(mutex_);
+  return dropped_;
+}
+
+}  // namespace gimnet::gimi

@@ -1,0 +1,116 @@
+#include "client/gimi/answer_queue.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "tests/client/gimi/support/made_message.hpp"
+
+// The queue alone: the uplink was never opened, so what it sends goes nowhere.
+
+namespace gimnet::gimi {
+namespace {
+
+using proto::gimi::kFlagAgain;
+using proto::gimi::kFlagRepeat;
+using proto::gimi::kNoDeadline;
+using proto::gimi::MessageHeader;
+using proto::gimi::Operation;
+
+class AnswerQueueTest : public testing::Test {
+ protected:
+  /// Was it kept?
+  bool ask(std::uint32_t sequence, std::uint8_t flags = 0, std::uint32_t left_ms = kNoDeadline) {
+    Message message = gimnet::test::make_message("x", sequence);
+    return queue_.on_request({sequence, Operation::request, flags, 0, 7}, message, left_ms);
+  }
+  Uplink uplink_;
+  AnswerQueue queue_{uplink_, "calc/add"};
+};
+
+TEST_F(AnswerQueueTest, GivesRequestsOutInOrderWithTheTimeThatIsLeft) {
+  EXPECT_TRUE(ask(1));
+  EXPECT_TRUE(ask(2, 0, 60'000));
+  const auto first = queue_.receive(kNoWait).or_throw();
+  EXPECT_EQ(first.name, (std::uint64_t{7} << 32) | 1);
+  EXPECT_EQ(first.left_ms, -1);
+  const auto second = queue_.receive(kNoWait).or_throw();
+  EXPECT_EQ(static_cast<std::uint32_t>(second.name), 2u);
+  EXPECT_GT(second.left_ms, 50'000);
+  EXPECT_LE(second.left_ms, 60'000);
+  EXPECT_TRUE(queue_.receive(kNoWait).is(Status::timeout));
+}
+
+TEST_F(AnswerQueueTest, RefusesMoreThanItsLimit) {
+  for (std::uint32_t i = 1; i <= AnswerQueue::kWaitingMax; ++i) EXPECT_TRUE(ask(i));
+  EXPECT_FALSE(ask(1000));
+  static_cast<void>(queue_.receive(kNoWait).or_throw());
+  EXPECT_TRUE(ask(1001));
+}
+
+TEST_F(AnswerQueueTest, DoesNotGiveOutWhatIsTooLate) {
+  EXPECT_TRUE(ask(1, 0, 0));
+  EXPECT_TRUE(ask(2));
+  EXPECT_EQ(static_cast<std::uint32_t>(queue_.receive(kNoWait).or_throw().name), 2u);
+  EXPECT_TRUE(queue_.reply((std::uint64_t{7} << 32) | 1, "3", kNoWait).is(Status::closed));
+}
+
+TEST_F(AnswerQueueTest, ARequestIsAnsweredOnce) {
+  EXPECT_TRUE(ask(1));
+  const auto taken = queue_.receive(kNoWait).or_throw();
+  EXPECT_FALSE(queue_.reply(taken.name, "3", kNoWait).is(Status::bad_argument));
+  EXPECT_TRUE(queue_.reply(taken.name, "3", kNoWait).is(Status::closed));
+  EXPECT_TRUE(queue_.fail(taken.name, {}).is(Status::closed));
+}
+
+TEST_F(AnswerQueueTest, OneThatIsAskedAgainIsDoneOnce) {
+  EXPECT_TRUE(ask(1));
+  EXPECT_FALSE(ask(1, kFlagAgain)) << "it waits";
+  const auto taken = queue_.receive(kNoWait).or_throw();
+  EXPECT_FALSE(ask(1, kFlagAgain)) << "the program has it";
+  static_cast<void>(queue_.reply(taken.name, "3", kNoWait));
+  EXPECT_FALSE(ask(1, kFlagAgain)) << "its answer is kept";
+  EXPECT_TRUE(ask(2, kFlagAgain)) << "it never came";
+}
+
+TEST_F(AnswerQueueTest, OneOfWhichNothingIsKeptIsDoneAgainOnlyIfItMayBe) {
+  EXPECT_TRUE(ask(1));
+  static_cast<void>(queue_.reply(queue_.receive(kNoWait).or_throw().name, "3", kNoWait));
+  for (std::uint32_t i = 2; i <= 1 + AnswerQueue::kAnswersMax; ++i) {
+    EXPECT_TRUE(ask(i));
+    static_cast<void>(queue_.reply(queue_.receive(kNoWait).or_throw().name, "3", kNoWait));
+  }
+  EXPECT_FALSE(ask(1, kFlagAgain));
+  EXPECT_TRUE(ask(1, kFlagAgain | kFlagRepeat));
+}
+
+TEST_F(AnswerQueueTest, KeepsAnswersUpToSoManyBytes) {
+  const std::string large(AnswerQueue::kAnswerBytesMax, 'x');
+  EXPECT_TRUE(ask(1));
+  static_cast<void>(queue_.reply(queue_.receive(kNoWait).or_throw().name, "3", kNoWait));
+  EXPECT_TRUE(ask(2));
+  static_cast<void>(queue_.reply(queue_.receive(kNoWait).or_throw().name, large, kNoWait));
+  EXPECT_TRUE(ask(2, kFlagAgain | kFlagRepeat) == false) << "its answer is kept";
+  EXPECT_TRUE(ask(1, kFlagAgain | kFlagRepeat)) << "the larger one took its place";
+}
+
+TEST_F(AnswerQueueTest, NothingIsTakenAfterItsEnd) {
+  EXPECT_TRUE(ask(1));
+  queue_.end(Ending::closed());
+  EXPECT_TRUE(queue_.receive(kNoWait).is(Status::closed));
+  EXPECT_FALSE(ask(2));
+}
+
+TEST(AnswerTable, FindsAServiceByItsKey) {
+  Uplink uplink;
+  AnswerTable table(uplink);
+  const auto added = table.add("calc/add");
+  EXPECT_EQ(added.key.type, proto::gimi::kRequestType);
+  EXPECT_EQ(table.find(added.key), added.queue);
+  EXPECT_EQ(table.find({added.key.type + 1, added.key.instance}), nullptr);
+  table.remove(added.key);
+  EXPECT_EQ(table.find(added.key), nullptr);
+}
+
+}  // namespace
+}  // namespace gimnet::gimi

@@ -1,0 +1,181 @@
+#include "client/gimi/open_requests.hpp"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "client/gimi/answer_queue.hpp"
+#include "gimnet/gimi.hpp"
+#include "tests/client/gimi/support/hub_process.hpp"
+
+// Requests between two nodes by a hub: each way in which one ends, and whether it was done.
+
+namespace gimnet {
+namespace {
+
+using gimi::AnswerQueue;
+using gimi::OpenRequests;
+using test::HubProcess;
+using test::kPatience;
+
+constexpr Timeout kWait = std::chrono::duration_cast<Timeout>(kPatience);
+
+class OpenRequestsTest : public testing::Test {
+ protected:
+  HubProcess hub_;
+  std::optional<Node> calc_{Node("calc", hub_.url())};
+  std::optional<Answers> add_{calc_->answer("add").or_throw()};
+  Node asker_{"", hub_.url()};
+};
+
+TEST_F(OpenRequestsTest, AReplyComesToWhoAsked) {
+  std::thread answering([&] {
+    for (int i = 0; i < 2; ++i) {
+      auto request = add_->receive(kWait).or_throw();
+      EXPECT_EQ(request.from(), asker_.peer());
+      EXPECT_GT(request.left(), Timeout{0});
+      request.reply("sum of " + std::string(request.text())).or_throw();
+      EXPECT_TRUE(request.reply("twice").is(Status::closed));
+    }
+  });
+  const Reply reply = asker_.request("calc/add", "1 2", kWait);
+  EXPECT_TRUE(reply) << reply.failure().sentence;
+  EXPECT_EQ(reply.text(), "sum of 1 2");
+  EXPECT_EQ(reply.from(), calc_->peer());
+  EXPECT_EQ(reply.ran(), Ran::yes);
+  const std::string large(std::size_t{1} << 20, 'x');
+  EXPECT_EQ(asker_.request("calc/add", large, kWait).data().size(), large.size() + 7);
+  answering.join();
+}
+
+TEST_F(OpenRequestsTest, TheOtherProgramsErrorSpeaksForItself) {
+  std::thread answering([&] { add_->receive(kWait).or_throw().fail(-7, "no numbers").or_throw(); });
+  const Reply reply = asker_.request("calc/add", "a", kWait);
+  EXPECT_TRUE(reply.is(Status::failed));
+  EXPECT_EQ(reply.code(), -7);
+  EXPECT_EQ(reply.failure().sentence, "calc/add: no numbers");
+  EXPECT_EQ(reply.ran(), Ran::yes);
+  answering.join();
+}
+
+TEST_F(OpenRequestsTest, OneThatTheProgramLetsGoMayHaveBeenDone) {
+  std::thread answering([&] { static_cast<void>(add_->receive(kWait).or_throw()); });
+  const Reply reply = asker_.request("calc/add", "", kWait);
+  EXPECT_TRUE(reply.is(Status::gone));
+  EXPECT_EQ(reply.ran(), Ran::maybe);
+  answering.join();
+}
+
+TEST_F(OpenRequestsTest, NobodyAnswersThere) {
+  const Queue drive = calc_->accept("drive").or_throw();
+  const Publisher odom = calc_->advertise("odom").or_throw();
+  for (const char* service : {"calc/multiply", "nobody/add", "calc/drive", "calc/odom"}) {
+    const Reply reply = asker_.request(service, "", kWait);
+    EXPECT_TRUE(reply.is(Status::not_found)) << service << ": " << reply.failure().sentence;
+    EXPECT_EQ(reply.ran(), Ran::no) << service;
+  }
+}
+
+TEST_F(OpenRequestsTest, TooManyThatWaitAreRefused) {
+  std::vector<PendingReply> pending;
+  for (std::size_t i = 0; i <= AnswerQueue::kWaitingMax; ++i)
+    pending.push_back(asker_.request_later("calc/add", "", kWait).or_throw());
+  const auto refused = pending.back().wait(kWait);
+  ASSERT_TRUE(refused);
+  EXPECT_TRUE(refused->is(Status::busy)) << refused->failure().sentence;
+  EXPECT_EQ(refused->ran(), Ran::no);
+  EXPECT_FALSE(pending.front().wait(kNoWait));
+  EXPECT_TRUE(add_->receive(kWait).or_throw().reply("first"));
+  EXPECT_EQ(pending.front().wait(kWait)->text(), "first");
+}
+
+TEST_F(OpenRequestsTest, ItsTimeIsOver) {
+  const auto pending = asker_.request_later("calc/add", "first", Timeout{50}).or_throw();
+  const Reply reply = asker_.request("calc/add", "second", Timeout{200});
+  EXPECT_TRUE(reply.is(Status::timeout));
+  EXPECT_EQ(reply.ran(), Ran::maybe);
+  // The first came before the second, and its time was over long ago.
+  const auto taken = add_->receive(kNoWait);
+  EXPECT_TRUE(!taken || taken->text() == "second") << "what is too late is not given out";
+}
+
+TEST_F(OpenRequestsTest, TheProgramEnds) {
+  const auto pending = asker_.request_later("calc/add", "", kWait).or_throw();
+  const auto request = add_->receive(kWait).or_throw();
+  calc_.reset();
+  const auto reply = pending.wait(kWait);
+  ASSERT_TRUE(reply);
+  EXPECT_TRUE(reply->is(Status::gone)) << reply->failure().sentence;
+  EXPECT_EQ(reply->ran(), Ran::maybe);
+}
+
+TEST_F(OpenRequestsTest, TheServiceEndsBeforeTheRequestIsTaken) {
+  const auto pending = asker_.request_later("calc/add", "", kWait).or_throw();
+  EXPECT_FALSE(pending.wait(Timeout{20}));
+  add_.reset();
+  const auto reply = pending.wait(kWait);
+  ASSERT_TRUE(reply);
+  EXPECT_TRUE(reply->is(Status::not_found) || reply->is(Status::gone));
+}
+
+TEST_F(OpenRequestsTest, TheOwnNodeIsClosed) {
+  const auto pending = asker_.request_later("calc/add", "", kWait).or_throw();
+  asker_.close();
+  const auto reply = pending.wait(kWait);
+  ASSERT_TRUE(reply);
+  EXPECT_TRUE(reply->is(Status::closed));
+  EXPECT_EQ(reply->ran(), Ran::maybe);
+  EXPECT_TRUE(asker_.request("calc/add").is(Status::closed));
+}
+
+TEST_F(OpenRequestsTest, AnotherProgramOfThatNameIsAskedNext) {
+  std::optional<PendingReply> pending(asker_.request_later("calc/add", "", kWait).or_throw());
+  static_cast<void>(add_->receive(kWait).or_throw().reply("first"));
+  EXPECT_EQ(pending->wait(kWait)->text(), "first");
+  add_.reset();
+  calc_.reset();
+  const Node other("calc", hub_.url());
+  const Answers answers = other.answer("add").or_throw();
+  std::thread answering([&] { answers.receive(kWait).or_throw().reply("other").or_throw(); });
+  // The asking node may hear of the other one a moment later.
+  std::string text;
+  EXPECT_TRUE(test::eventually([&] {
+    const Reply reply = asker_.request("calc/add", "", kWait);
+    text = reply.text();
+    return reply || !reply.is(Status::not_found);
+  }));
+  EXPECT_EQ(text, "other");
+  answering.join();
+}
+
+TEST_F(OpenRequestsTest, ManyAtOnceGetTheirOwnReplies) {
+  constexpr int kThreads = 4;
+  constexpr int kRequests = 200;
+  std::atomic<bool> over = false;
+  std::thread answering([&] {
+    while (!over) {
+      auto request = add_->receive(Timeout{50});
+      if (request) static_cast<void>(request->reply(std::string(request->text())));
+    }
+  });
+  std::vector<std::thread> asking;
+  for (int thread = 0; thread < kThreads; ++thread) {
+    asking.emplace_back([&, thread] {
+      for (int i = 0; i < kRequests; ++i) {
+        const std::string text = std::to_string(thread) + "/" + std::to_string(i);
+        const Reply reply = asker_.request("calc/add", text, kWait);
+        EXPECT_EQ(reply.text(), text) << reply.failure().sentence;
+      }
+    });
+  }
+  for (auto& thread : asking) thread.join();
+  over = true;
+  answering.join();
+}
+
+}  // namespace
+}  // namespace gimnet
