@@ -112,7 +112,7 @@ typedef struct nif_options {
   size_t struct_size; /**< sizeof(nif_options). */
   /** `tcp://host:port` or `unix:/path`. NULL or "": the environment's GIMNET_HUB; where that is not
    * set, the hub's default Unix socket (gimnet/tcphub.sock in XDG_RUNTIME_DIR, else in the folder
-   * gimnet-<uid> in the temporary folder, which must belong to this user), then
+   * gimnet-UID in the temporary folder, which must belong to this user), then
    * tcp://127.0.0.1:7450. */
   const char* url;
   const char* name; /**< Name to register, NULL or "": a node without a name, found by id only. */

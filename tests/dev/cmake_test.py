@@ -3,6 +3,7 @@
 
 Usage: cmake_test.py CMAKE"""
 
+import json
 import os
 import pathlib
 import re
@@ -24,9 +25,9 @@ OUTSIDE = f"""cmake_minimum_required(VERSION 3.22)
 project(outside LANGUAGES C CXX)
 add_subdirectory({ROOT} gimnet)
 add_executable(pose {ROOT}/examples/pose.c)
-target_link_libraries(pose PRIVATE gimnet_bitestream)
+target_link_libraries(pose PRIVATE gimnet::bitestream_static)
 add_library(publisher OBJECT {ROOT}/examples/publisher.cpp)
-target_link_libraries(publisher PRIVATE gimnet_gimi)
+target_link_libraries(publisher PRIVATE gimnet::gimi)
 """
 
 
@@ -63,8 +64,14 @@ class Configuring(unittest.TestCase):
                 self.assertEqual(there.returncode, 0, there.stderr)
 
     def test_is_a_part_of_another_project(self):
-        made = self.configure(OUTSIDE, "-DCMAKE_BUILD_TYPE=Release")
+        made = self.configure(OUTSIDE, "-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_EXPORT_COMPILE_COMMANDS=ON",
+                              "-DGIMNET_WARNINGS_AS_ERRORS=ON")
         self.assertEqual(made.returncode, 0, made.stderr)
+        commands = {entry["file"]: entry["command"]
+                    for entry in json.loads((self.folder / "build" / "compile_commands.json").read_text())}
+        for example in ("pose.c", "publisher.cpp"):
+            command = commands[f"{ROOT}/examples/{example}"]
+            self.assertNotRegex(command, r" -W|/src\b", "options and folders of the project are its own")
         built = self.cmake("--build", self.folder / "build", "--target", "pose", "publisher")
         self.assertEqual(built.returncode, 0, built.stdout + built.stderr)
         pose = subprocess.run([self.folder / "build" / "pose"], stdin=subprocess.DEVNULL, capture_output=True, text=True,
@@ -121,7 +128,7 @@ class WholeProject(unittest.TestCase):
 
     def test_the_product_is_programs_libraries_and_examples_alone(self):
         inputs = self.inputs("product")
-        for part in ("src/hub/main.cpp", "src/tools/gimnet/main.cpp", "src/tools/demo/main.cpp", "src/client/libgimnet.mri",
+        for part in ("src/hub/main.cpp", "src/tools/gimnet/main.cpp", "src/tools/demo/main.cpp", "src/client/gimnet.map",
                      "examples/publisher.cpp"):
             self.assertIn(part, inputs)
         folders = {line.split("/")[0] for line in inputs if re.match(r"[^/].*\.(c|cpp|o)$", line)}
