@@ -21,10 +21,6 @@ function(gimnet_pkg_config name description)
   file(RELATIVE_PATH up /prefix/${CMAKE_INSTALL_LIBDIR}/pkgconfig /prefix)
   get_target_property(needs gimnet_static INTERFACE_LINK_LIBRARIES)
   list(JOIN needs " " needs)
-  set(link -lgimnet)
-  if(name STREQUAL gimi)  # as gimnet::gimi, see src/client/CMakeLists.txt
-    set(link "-l:libgimnet.a ${needs}")
-  endif()
   configure_file(${PROJECT_SOURCE_DIR}/cmake/gimnet.pc.in ${PROJECT_BINARY_DIR}/${name}.pc @ONLY)
   install(FILES ${PROJECT_BINARY_DIR}/${name}.pc
     DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT development)
