@@ -119,8 +119,6 @@ class Conductor final : private Administration {
   [[nodiscard]] const Links* links() const { return links_.get(); }
   [[nodiscard]] const Membership& membership() const { return membership_; }
   [[nodiscard]] const Watches& watches() const { return watches_; }
-  /// Null: a hub alone.
-  [[nodiscard]] const Links* links() const { return links_.get(); }
 
  private:
   void attach(Stranger& stranger, const proto::Hello& hello, const Membership::Joined& joined,
