@@ -2,7 +2,9 @@
 """Services across linked hubs: a provider at one end of a chain of three, subscribers at the others."""
 
 import json
+import pathlib
 import subprocess
+import tempfile
 import unittest
 
 from stranger_parts.bitestream import BOOL, F64, TEXT, U32, every, fields, put
@@ -173,18 +175,23 @@ class Groups(Chain):
 class Ring(Case):
     """Four hubs in a ring, and a link across it."""
 
+    def linked(self, hub_id, *others):
+        """A hub that dials the others. The costs are fixed: measured ones change the routes of a busy machine."""
+        file = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory())) / "hub.toml"
+        file.write_text("".join(f'[[link]]\nurl = "{other.url}"\ncost = 10\n' for other in others))
+        return self.hub("--accept-links", "--config", str(file), *PATIENT, hub_id=hub_id)
+
     def setUp(self):
-        first = self.hub("--accept-links", *PATIENT, hub_id=1)
-        second = self.hub("--accept-links", "--link", first.url, *PATIENT, hub_id=2)
-        third = self.hub("--accept-links", "--link", second.url, "--link", first.url, *PATIENT, hub_id=3)
-        fourth = self.hub("--link", third.url, "--link", first.url, *PATIENT, hub_id=4)
+        first = self.linked(1)
+        second = self.linked(2, first)
+        third = self.linked(3, second, first)
+        fourth = self.linked(4, third, first)
         self.hubs = [first, second, third, fourth]
         self.nodes = [self.stranger(hub, f"node-{hub_id}") for hub_id, hub in enumerate(self.hubs, 1)]
 
         def all_links():
-            shown = run_gimnet(first, "graph", "--json")
-            edges = json.loads(shown.out)["links"]
-            return len(edges) == 5 and all(edge["agreed"] for edge in edges)
+            graphs = [json.loads(run_gimnet(hub, "graph", "--json").out)["links"] for hub in self.hubs]
+            return all(len(edges) == 5 and all(edge["agreed"] for edge in edges) for edges in graphs)
         wait_until(all_links, "all links")
 
     def test_a_broadcast_reaches_each_node_once(self):
