@@ -187,17 +187,13 @@ struct ConductorLoop::Impl {
     asio::post(context, [this] { take_events(); });
   }
 
+  /// A dial that ends behind the look wakes this thread, since the mark of the sleeper goes first.
   void take_dialled() {
-    wiring.dialler.waker().awake();
+    wiring.dialler.waker().prepare_to_sleep();
     look_whether_it_stood();
     for (auto& [link, outcome] : wiring.dialler.take_ended())
       wiring.conductor.on_dialled(link, std::move(outcome), now());
     arm_timer();
-    watch_dialler();
-  }
-
-  void watch_dialler() {
-    wiring.dialler.waker().prepare_to_sleep();
     dialler_watch.wait([this] {
       wiring.dialler.waker().clear();
       take_dialled();
