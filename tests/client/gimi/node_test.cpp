@@ -4,6 +4,7 @@
 #include <atomic>
 #include <csignal>
 #include <cstdint>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -38,6 +39,19 @@ TEST_F(NodeTest, JoinsWithAName) {
   EXPECT_TRUE(state.connected);
   EXPECT_EQ(state.peer, node.peer());
   EXPECT_TRUE(node.peer());
+}
+
+TEST_F(NodeTest, TellsWhatBecomesOfItsConnectionIfAskedTo) {
+  ASSERT_EQ(::setenv("GIMNET_LOG", "info", 1), 0);
+  testing::internal::CaptureStderr();
+  const Node node = Node::join({.name = "robot", .hub = hub_.url(), .reconnect = false}).or_throw();
+  hub_.kill();
+  EXPECT_FALSE(node.receive(kWait));
+  ASSERT_EQ(::unsetenv("GIMNET_LOG"), 0);
+  const std::string told = testing::internal::GetCapturedStderr();
+  EXPECT_NE(told.find("gimnet: robot: connected to the hub "), std::string::npos) << told;
+  EXPECT_NE(told.find("gimnet: robot: no connection will come any more: "), std::string::npos)
+      << told;
 }
 
 // Signals belong to the program, which may wait for them with sigwait() in a thread of its own.
