@@ -159,7 +159,8 @@ class Documented(unittest.TestCase):
         self.assertEqual(set(subscriber.out.splitlines()), {b"x 1.0 y 2.0"})
         hub.process.signal(9)
         hub.process.wait()
-        wait_until(lambda: "the hub has been away for " in publisher.err, f"the reason; it said: {publisher.err}")
+        wait_until(lambda: "gimnet: robot: lost the connection to the hub" in publisher.err,
+                   f"the reason; it said: {publisher.err}")
         before = subscriber.out.count(b"\n")
         hub = hub.again(self)
         wait_until(lambda: subscriber.out.count(b"\n") >= before + 3, "messages by the hub that was started anew")
@@ -185,7 +186,7 @@ class Documented(unittest.TestCase):
         self.assertEqual([got[key] for key in ("type", "instance", "sequence", "text")], [4, 1, 1, "v 0.5"])
 
     def start(self, hub, program):
-        process = Process([program], env={"GIMNET_HUB": hub.url})
+        process = Process([program], env={"GIMNET_HUB": hub.url, "GIMNET_LOG": "info"})
         self.addCleanup(process.end)
         return process
 

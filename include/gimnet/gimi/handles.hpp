@@ -151,6 +151,13 @@ class Sender {
 /// not stand still for as long as its hub is away, and what it would have said is old by then.
 inline constexpr Timeout kPublishTimeout{1000};
 
+/// The answer of Publisher::publish(), which may be ignored: what could not be sent is old by the
+/// next time.
+class Published : public Outcome<void> {
+ public:
+  Published(Outcome<void> outcome) : Outcome<void>(std::move(outcome)) {}
+};
+
 /// An own service that provides data. Copies are the same service; with the last one it ends, which
 /// asks the hub and waits for its answer, a second at most.
 class Publisher {
@@ -161,12 +168,11 @@ class Publisher {
   /// Errors: timeout (not sent; subscribers may count it as missed), not_retained (sent, but too
   /// large to be kept), refused (the hub did not take the service again), not_connected, too_large,
   /// closed.
-  Outcome<void> publish(BytesView data, Timeout timeout = kPublishTimeout,
-                        More more = More::no) const {
+  Published publish(BytesView data, Timeout timeout = kPublishTimeout, More more = More::no) const {
     return detail::outcome_of(gimi_publish(handle_->value(), data.data(), data.size(),
                                            milliseconds_of(timeout), more == More::yes ? 1 : 0));
   }
-  Outcome<void> publish(BytesView data, More more) const {
+  Published publish(BytesView data, More more) const {
     return publish(data, kPublishTimeout, more);
   }
   /// Their number, as the hub told last.
