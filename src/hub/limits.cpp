@@ -150,6 +150,10 @@ constexpr std::array kTable{
               "application data of the messages that are kept for services with retain, the whole "
               "hub; one node may have half of it",
               false, true},
+    LimitInfo{"names_bytes", "bytes", &Limits::names_bytes, kMiB, 64 * kGiB,
+              "names of nodes and services of all linked hubs: each takes 288 bytes and its text; "
+              "beyond, no names of other hubs are taken, and own nodes get no new ones",
+              false, true},
     LimitInfo{"page_records", "records", &Limits::page_records, 1, 1'000,
               "in one answer to LIST and the like", true},
     LimitInfo{"scan_records", "records", &Limits::scan_records, 64, 1'000'000,

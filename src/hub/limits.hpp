@@ -74,6 +74,7 @@ struct Limits {
   std::uint64_t subscription_rate_hz = 1'000;
   std::uint64_t retained_message_bytes = 16ull << 20;
   std::uint64_t retained_budget_bytes = 64ull << 20;
+  std::uint64_t names_bytes = 64ull << 20;
   std::uint64_t page_records = 256;
   std::uint64_t scan_records = 4'096;
   std::uint64_t watches_per_node = 16;

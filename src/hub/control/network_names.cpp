@@ -22,7 +22,8 @@ void NetworkNames::begin_connection(LinkNumber number, milliseconds now) {
 
 void NetworkNames::begin() {
   exchange_.emplace(NameCopies::Options{{parts_.facts.id, parts_.facts.instance},
-                                        milliseconds{parts_.limits.grace_ms}});
+                                        milliseconds{parts_.limits.grace_ms},
+                                        parts_.limits.names_bytes});
   for (const auto& [index, session] : parts_.membership.sessions().all()) put(session);
   for (const auto& [group, topic] : parts_.membership.services().groups()) put(*topic);
   parts_.membership.join_network(exchange_->copies());

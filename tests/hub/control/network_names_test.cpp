@@ -175,6 +175,24 @@ TEST_F(NetworkNamesTest, AnotherHubsNodesAreResolvedAndReversed) {
       << "of this hub's own names";
 }
 
+TEST_F(NetworkNamesTest, TakesNoMoreNewNamesThanThereIsRoomFor) {
+  here_.limits.names_bytes = 1 << 20;
+  connect();
+  std::size_t joined = 0;
+  for (bool room = true; room && joined < 10'000;) {
+    JoinRequest request;
+    request.name = std::string(200, 'n') + std::to_string(joined);
+    request.identity = Identity::open();
+    Effects effects;
+    room = static_cast<bool>(here_.membership.join(request, here_.now, effects));
+    here_.carry_out(effects);
+    joined += room ? 1 : 0;
+  }
+  EXPECT_GT(joined, 1'000u);
+  EXPECT_LT(joined, std::size_t{1 << 20} / 288);
+  there_.join("robot");  // whose hub has room
+}
+
 TEST_F(NetworkNamesTest, ANodeThatIsAwayOrUnreachableIsSaidToBe) {
   const Session& asker = here_.join("asker");
   Session& robot = there_.join("robot");

@@ -37,8 +37,8 @@ std::optional<proto::Goodbye> Membership::network_refusal(std::string_view name,
   const auto known = names_->find(name);
   if (!known && names_->is_full()) {
     return proto::Goodbye{GoodbyeCode::hub_full,
-                          "the names of all hubs together are as many as this hub has room for; go "
-                          "on without a name, or try again later"};
+                          "the names of all hubs together are as many as this hub has room for "
+                          "(names_bytes); go on without a name, or try again later"};
   }
   if (!known || known->hub == names_->self().hub) return std::nullopt;
   if (known->claim->service)
