@@ -11,6 +11,7 @@
 
 #include "base/standard_streams.hpp"
 #include "tools/demo/carmen_log.hpp"
+#include "tools/demo/labs.hpp"
 #include "tools/demo/log_player.hpp"
 #include "tools/demo/node_port.hpp"
 #include "tools/demo/options.hpp"
@@ -24,6 +25,8 @@ namespace gimnet::demo {
 namespace {
 
 constexpr Extent kPicture{80, 24};
+/// Without a terminal there is nobody to end the laboratories.
+constexpr double kLabsSeconds = 20.0;
 
 // fmt::print() throws where nobody reads any more (a closed terminal, `| head`); that must not keep
 // the children alive.
@@ -168,6 +171,28 @@ ExitCode run_viewer(const DemoOptions& options) {
                                                                      : ExitCode::kLost;
 }
 
+// Runs the two laboratories; prints the summary at the end.
+ExitCode run_laboratories(const DemoOptions& options) {
+  std::unique_ptr<Terminal> terminal = Terminal::open({STDIN_FILENO, STDOUT_FILENO});
+  LabsOptions labs{folder_of_this_program(),
+                   options.seconds,
+                   terminal.get(),
+                   style_for(options, terminal.get()),
+                   {}};
+  if (terminal == nullptr) {
+    if (!labs.seconds) labs.seconds = kLabsSeconds;
+    labs.on_progress = [](const std::string& line) { say(line + "\n"); };
+  }
+  const Result<LabsRecord> record = run_labs(labs);
+  terminal.reset();
+  if (!record) {
+    complain(record.error());
+    return ExitCode::kNoNetwork;
+  }
+  if (!show(summary_text(*record))) return ExitCode::kLost;
+  return complaints_about(*record).empty() ? ExitCode::kGood : ExitCode::kLost;
+}
+
 }  // namespace
 }  // namespace gimnet::demo
 
@@ -188,6 +213,7 @@ int main(int count, char** words) {
   constexpr unsigned kRobotPatience_s = 1;
   constexpr unsigned kViewerPatience_s = 20;
   remember_stop_signals(options->role == Role::kRobot ? kRobotPatience_s : kViewerPatience_s);
+  if (options->labs) return static_cast<int>(run_laboratories(*options));
   return static_cast<int>(options->role == Role::kRobot ? run_robot(*options)
                                                         : run_viewer(*options));
 }

@@ -19,6 +19,9 @@ constexpr std::string_view kUsage =
   gimnet-demo --seconds 10          drives a course by itself, ends with a summary from the hub's counters;
                                     the exit code is 0 if nothing was lost, else 1
 
+  gimnet-demo --labs                two laboratories with a hub each, a WAN between that is cut now and then,
+                                    a hub inside a robot, three machines, a camera for two viewers
+
 Starts a hub of its own, and the robot as a separate process. For your own hub, or two computers:
 
   gimnet-demo robot --hub URL       only the robot
@@ -44,12 +47,17 @@ struct Argument {
   bool takes_value;
   unsigned roles;
 };
-constexpr Argument kArguments[] = {
-    {"--log", true, kInAll | kInRobot},   {"--map", true, kInAll | kInRobot},
-    {"--speed", true, kInAll | kInRobot}, {"--seconds", true, kInAll | kInView},
-    {"--hub", true, kInRobot | kInView},  {"--robot", true, kEverywhere},
-    {"--ascii", false, kInAll | kInView}, {"--utf8", false, kInAll | kInView},
-    {"--help", false, kEverywhere},       {"-h", false, kEverywhere}};
+constexpr Argument kArguments[] = {{"--log", true, kInAll | kInRobot},
+                                   {"--map", true, kInAll | kInRobot},
+                                   {"--speed", true, kInAll | kInRobot},
+                                   {"--seconds", true, kInAll | kInView},
+                                   {"--hub", true, kInRobot | kInView},
+                                   {"--robot", true, kEverywhere},
+                                   {"--ascii", false, kInAll | kInView},
+                                   {"--utf8", false, kInAll | kInView},
+                                   {"--labs", false, kInAll},
+                                   {"--help", false, kEverywhere},
+                                   {"-h", false, kEverywhere}};
 
 std::optional<Error> read_number(auto& out, std::string_view name, std::string_view text,
                                  double least, double most) {
@@ -93,6 +101,7 @@ std::optional<Error> apply(DemoOptions& options, std::string_view name, std::str
     return read_number(options.seconds, name, value, 0.1, DemoOptions::kSecondsMax);
   if (name == "--ascii") options.glyphs = Glyphs::kAscii;
   if (name == "--utf8") options.glyphs = Glyphs::kUtf8;
+  if (name == "--labs") options.labs = true;
   if (name == "--help" || name == "-h") options.help = true;
   if (name != "--robot") return std::nullopt;
   if (!is_node_name(value)) {
@@ -111,6 +120,10 @@ std::optional<Error> misplaced(const Argument& argument, Role role) {
         fmt::format("{} is for one part of the demo: say 'robot' or 'view' first, or leave it out",
                     argument.name)};
   }
+  if (argument.roles == kInAll) {
+    return Error{
+        fmt::format("{} is for the whole demo; leave 'robot' or 'view' out", argument.name)};
+  }
   return Error{
       role == Role::kView
           ? fmt::format("{} is the robot's; give it to 'gimnet-demo robot'", argument.name)
@@ -125,6 +138,10 @@ std::optional<Error> contradiction(const std::vector<std::string_view>& given) {
     return Error{"--log and --map exclude each other: a log brings its own world; leave one out"};
   if (has("--speed") && !has("--log"))
     return Error{"--speed is the speed of a log; add --log FILE, or leave it out"};
+  for (const std::string_view name : {"--log", "--map", "--robot"}) {
+    if (has("--labs") && has(name))
+      return Error{fmt::format("--labs brings its own machines; leave {} out", name)};
+  }
   if (has("--ascii") && has("--utf8"))
     return Error{"--ascii and --utf8 exclude each other; leave one out"};
   return std::nullopt;

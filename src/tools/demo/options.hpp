@@ -25,6 +25,7 @@ struct DemoOptions {
 
   Role role = Role::kAll;
   bool help = false;
+  bool labs = false;  ///< two laboratories in place of one robot
   /// A log to play; empty: a simulated robot.
   std::string log;
   /// A hall for the simulated robot; empty: the built-in one.

@@ -124,6 +124,7 @@ std::optional<Error> Viewer::step(std::int64_t wait_ns) {
 }
 
 bool Viewer::time_is_over() const {
+  if (options_.over && options_.over()) return true;
   const bool unattended = terminal_ == nullptr || options_.seconds;
   if (unattended && monitor_.info() && monitor_.info()->ended) return true;
   if (!options_.seconds || first_heard_ns_ == 0) return false;

@@ -25,6 +25,8 @@ struct ViewerOptions {
   bool own_robot = true;
   std::string hub_url;
   TerminalStyle style;
+  /// Is it to end now? May be empty.
+  std::function<bool()> over;
   /// Answers what happened to the other processes, and waits for it at most so long; may be empty.
   std::function<std::optional<Error>(std::int64_t wait_ns)> trouble;
   /// Takes a line now and then where there is no terminal; may be empty.

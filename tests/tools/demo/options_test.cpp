@@ -65,6 +65,9 @@ TEST(DemoOptions, RefusesWhatMeansNothingTogether) {
   EXPECT_THAT(complaint({"view", "--log", "a"}), HasSubstr("is the robot's"));
   EXPECT_THAT(complaint({"robot", "--seconds", "5"}), HasSubstr("is the viewer's"));
   EXPECT_THAT(complaint({"--ascii", "--utf8"}), HasSubstr("exclude each other"));
+  EXPECT_TRUE(parsed({"--labs", "--seconds", "5"}).value().labs);
+  EXPECT_THAT(complaint({"--labs", "--map", "a"}), HasSubstr("brings its own machines"));
+  EXPECT_THAT(complaint({"view", "--labs"}), HasSubstr("is for the whole demo"));
 }
 
 TEST(DemoOptions, HelpNeedsNothingElse) {
