@@ -1,5 +1,5 @@
-# cmake --install: components runtime, development (with the library itself), tools and hub. Nothing
-# installed names the folder it was installed into, so the prefix may be moved.
+# cmake --install: components runtime, development (with the library itself), tools, hub and python.
+# Nothing installed names the folder it was installed into, so the prefix may be moved.
 include(CMakePackageConfigHelpers)
 set(_cmake_folder ${CMAKE_INSTALL_LIBDIR}/cmake/gimnet)
 
@@ -37,3 +37,5 @@ if(TARGET tcphub)
   install(FILES ${PROJECT_SOURCE_DIR}/docs/tcphub.toml
     DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT hub)
 endif()
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/python/gimnet DESTINATION lib/python3/dist-packages
+  COMPONENT python PATTERN __pycache__ EXCLUDE)

@@ -10,7 +10,7 @@ import tempfile
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-COMMANDS = ("build", "check", "test", "demo", "perf", "bench", "sim", "stress", "fuzz", "lint", "format", "asan", "tsan", "boost174", "install", "docs")
+COMMANDS = ("build", "check", "test", "demo", "perf", "bench", "sim", "stress", "fuzz", "lint", "format", "asan", "tsan", "boost174", "install", "docs", "wheel")
 # All that changes a machine or a tree.
 PROGRAMS = ("apt-get", "sudo", "env", "sh", "cmake", "ctest", "clang-format-19", "shellcheck", "rm", "mkdir")
 CALLED = '#!/bin/sh\necho "${0##*/} $*" >>"$DEV_TEST_CALLS"\n'
@@ -97,6 +97,7 @@ class Door(unittest.TestCase):
         self.assert_refuses("lint", "src", saying="lint takes no arguments")
         self.assert_refuses("planted", "A", saying="planted takes no arguments")
         self.assert_refuses("format", "src", saying="format takes no arguments")
+        self.assert_refuses("wheel", "src", saying="wheel takes no arguments")
         self.assert_refuses("docs", "src", saying="docs takes no arguments")
         self.assert_refuses("install", saying="usage: ./dev install PREFIX")
         self.assert_refuses("install", "/nowhere", "all", saying="no component 'all'")

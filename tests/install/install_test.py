@@ -52,7 +52,7 @@ class Installed(unittest.TestCase):
         cls.addClassCleanup(folder.cleanup)
         cls.folder = pathlib.Path(folder.name)
         first = cls.folder / "first"
-        for component in ("runtime", "development", "tools", "hub"):
+        for component in ("runtime", "development", "tools", "hub", "python"):
             cls.run_command([CMAKE, "--install", BUILD, "--prefix", first, "--component", component])
         cls.prefix = first.rename(cls.folder / "moved")
         cls.library = cls.prefix / "lib"
@@ -127,6 +127,12 @@ class Installed(unittest.TestCase):
             if path.suffix in (".cmake", ".pc"):
                 for folder in (ROOT, BUILD, self.folder):
                     self.assertNotIn(str(folder), path.read_text(), path.name)
+
+    def test_python_finds_the_library_of_its_prefix(self):
+        package = self.library / "python3" / "dist-packages"
+        said = self.run_command([sys.executable, "-c", "import gimnet; print(gimnet.node._c.lib._name)"], PYTHONPATH=str(package),
+                                PYTHONDONTWRITEBYTECODE="1", GIMNET_LIBRARY="")
+        self.assertEqual(pathlib.Path(said.strip()), (self.library / "libgimnet.so.1").resolve())
 
     def test_programs_run_from_the_prefix(self):
         for program in ("tcphub", "gimnet"):

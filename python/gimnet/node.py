@@ -1,0 +1,258 @@
+"""Nodes, and what they publish, subscribe, accept, send and watch."""
+
+from __future__ import annotations
+
+import collections
+import ctypes
+import threading
+from dataclasses import dataclass
+from typing import Any, Deque, Dict, Iterator, List, Optional, Tuple, Type, Union
+
+from . import _c, errors, messages
+from .handles import Exit, Handle, Raw, Stream, in_pieces, sized, to_ms, to_text
+from .messages import Event, Message, NodeRecord, Peer, ServiceRecord
+from .requests import Answers, Pending, Reply
+
+__all__ = ["Node", "Publisher", "Source", "State", "Watch", "connect"]
+
+class Source(Stream[Message]):
+    """The messages of a subscription, or of an accepted service. A message counts as taken when
+    receive() fetched it. Of streams several are fetched at once."""
+
+    def __init__(self, node: Node, handle: int, kept: bool = False) -> None:
+        super().__init__(handle, kept)
+        self._node = node  # lives as long as its parts
+        self._ready: Deque[Message] = collections.deque()
+
+    def receive(self, timeout: Optional[float] = None) -> Message:
+        try:
+            return self._ready.popleft()
+        except IndexError:
+            pass
+        batch = _c.gimi_batch()
+        self.wait(timeout, lambda ms: _c.lib.gimi_receive_packed(self._handle, _c.GIMI_BATCH_MESSAGES_MAX, ms, batch))
+        first, *others = messages.unpacked(batch)
+        self._ready.extend(others)
+        return first
+
+    @property
+    def missed(self) -> int:
+        """Messages of a subscription that did not come, or were overwritten because nobody took them."""
+        counts = sized(_c.gimi_queue_counts)
+        self.check(_c.lib.gimi_counts(self._handle, counts))
+        return int(counts.missed)
+
+
+class Watch(Stream[Event]):
+    """The nodes and services that match a pattern: first what is there, then what changes."""
+
+    def __init__(self, node: Node, handle: int) -> None:
+        super().__init__(handle)
+        self._node = node
+
+    def receive(self, timeout: Optional[float] = None) -> Event:
+        raw = _c.gimi_watch_event()
+        self.wait(timeout, lambda ms: _c.lib.gimi_watch_receive(self._handle, ms, raw))
+        try:
+            return Event.of(raw)
+        finally:
+            _c.lib.gimi_watch_event_release(raw)
+
+
+class Publisher(Handle):
+    """A service that this node provides, until close() or the end of the node."""
+
+    # The program can do nothing about these but go on: the hub is away, or slow.
+    _AWAY = (_c.GIMI_TIMEOUT, _c.GIMI_NOT_CONNECTED, _c.GIMI_REFUSED)
+
+    def __init__(self, node: Node, handle: int) -> None:
+        super().__init__(handle, kept=True)
+        self._node = node
+
+    def publish(self, value: Any, timeout: float = 1.0) -> bool:
+        """Sends a dict as a Bitestream, a str as UTF-8, or any buffer. False: not sent, since the hub is
+        away or did not take it in time. Raises only for mistakes of the program."""
+        data, size, keeps = messages.payload(value)
+        status = in_pieces(timeout, lambda ms: _c.lib.gimi_publish(self._handle, data, size, ms, 0))
+        del keeps
+        if status in self._AWAY:
+            return False
+        if status != _c.GIMI_NOT_RETAINED:  # it was sent
+            self.check(status)
+        return True
+
+    @property
+    def subscribers(self) -> int:
+        return int(_c.lib.gimi_subscribers(self._handle))
+
+    def wait_for_subscribers(self, count: int = 1, timeout: Optional[float] = None) -> None:
+        """Timeout, Closed."""
+        self.wait(timeout, lambda ms: _c.lib.gimi_wait_for_subscribers(self._handle, count, ms))
+
+
+@dataclass(frozen=True)
+class State:
+    """The connection of a node at one moment. `ended`: it will not connect again; `trouble` says why it
+    broke last. Times are in seconds, of the hub's clock against this one."""
+
+    id: Peer
+    name: str
+    hub_id: int
+    hub_name: str
+    connected: bool
+    ended: bool
+    reconnects: int
+    trouble: str
+    hub_round_trip: float
+    hub_clock_offset: float
+
+
+class Node(Handle):
+    """A program on the network. Made by connect(); leaves with close(), or at the end of `with`."""
+
+    def __init__(self, handle: int) -> None:
+        super().__init__(handle)
+        self._senders: Dict[Union[str, Peer], int] = {}
+        self._lock = threading.Lock()  # guards _senders
+        Exit.nodes.add(self)
+
+    def __enter__(self) -> Node:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _opened(self, function: Any, *arguments: Any) -> int:
+        handle = ctypes.c_uint64()
+        self.check(function(self._handle, *arguments, handle))
+        return handle.value
+
+    def state(self) -> State:
+        raw = sized(_c.gimi_node_state)
+        self.check(_c.lib.gimi_state(self._handle, raw))
+        return State(Peer(raw.id), raw.name.decode(), raw.hub_id, raw.hub_name.decode(), bool(raw.connected), bool(raw.ended),
+                     raw.reconnects, raw.trouble.decode(errors="replace"), raw.hub_round_trip_ns / 1e9,
+                     raw.hub_clock_offset_ns / 1e9)
+
+    @property
+    def id(self) -> Peer:
+        return Peer(_c.lib.gimi_id(self._handle))
+
+    @property
+    def name(self) -> str:
+        return self.state().name
+
+    def advertise(self, name: str, *, delivery: str = "stream", window: int = 0, retain: bool = False,
+                  key: Tuple[int, int] = (0, 0), metadata: str = "", timeout: float = 5.0) -> Publisher:
+        """Provides the service `own name/name`. `delivery`: stream, latest, or sync, at most `window`
+        messages that a subscriber has not taken. BadName, Taken, Denied (a node without a name)."""
+        if delivery not in messages.DELIVERIES:
+            raise errors.BadArgument(f"there is no delivery {delivery!r}: use {', '.join(messages.DELIVERIES)}")
+        options = sized(_c.gimi_publish_options, key=_c.gimi_key(*key), delivery=messages.DELIVERIES[delivery], window=window,
+                         retain=retain, metadata=to_text(metadata), timeout_ms=to_ms(timeout))
+        return Publisher(self, self._opened(_c.lib.gimi_advertise, to_text(name), options))
+
+    def subscribe(self, full_name: str, *, rate_hz: float = 0.0, queue: int = 0, window: int = 0, depth: int = 0,
+                  timeout: float = 5.0) -> Source:
+        """Subscribes to a service, which need not exist yet. `queue`: messages that may wait; the oldest
+        is overwritten. `rate_hz`: the newest at each due time. BadName, NotFound (it takes commands)."""
+        options = sized(_c.gimi_subscribe_options, messages=queue, window=window, depth=depth, rate_hz=rate_hz,
+                         timeout_ms=to_ms(timeout))
+        return Source(self, self._opened(_c.lib.gimi_subscribe, to_text(full_name), options))
+
+    def accept(self, name: str, *, queue: int = 0, key: Tuple[int, int] = (0, 0), metadata: str = "",
+               timeout: float = 5.0) -> Source:
+        """Takes the commands that others send to `own name/name`, until close() or the end of the node."""
+        options = sized(_c.gimi_accept_options, key=_c.gimi_key(*key), messages=queue, metadata=to_text(metadata),
+                         timeout_ms=to_ms(timeout))
+        return Source(self, self._opened(_c.lib.gimi_accept, to_text(name), options), kept=True)
+
+    def send(self, to: Union[str, Peer], value: Any, timeout: float = 1.0) -> None:
+        """Sends to the service of that full name, or to a Peer of find(). NotFound, Timeout (not sent),
+        NotConnected, NotDelivered."""
+        sender = self._sender(to, timeout)
+        data, size, keeps = messages.payload(value)
+        status = in_pieces(timeout, lambda ms: _c.lib.gimi_send(sender, data, size, ms, 0))
+        del keeps
+        self.check(status)
+
+    def _sender(self, to: Union[str, Peer], timeout: float) -> int:
+        with self._lock:
+            if to not in self._senders:
+                self._senders[to] = (self._opened(_c.lib.gimi_sender, to, None) if isinstance(to, Peer) else
+                                     self._opened(_c.lib.gimi_sender_to_service, to_text(to), None, to_ms(timeout)))
+            return self._senders[to]
+
+    def answer(self, name: str, *, metadata: str = "", timeout: float = 5.0) -> Answers:
+        """Answers the questions that others ask `own name/name`, until close() or the end of the node."""
+        options = sized(_c.gimi_answer_options, metadata=to_text(metadata), timeout_ms=to_ms(timeout))
+        return Answers(self, self._opened(_c.lib.gimi_answer, to_text(name), options))
+
+    def request(self, service: str, value: Any, timeout: float = 5.0, *, repeat: bool = False) -> Reply:
+        """Asks whoever answers the service, and waits for the end of the request, of which there is exactly
+        one. Failed (the other's own error), NotFound, Busy, Gone, Timeout, NotDelivered ...: `ran` of the
+        exception says whether the work may have been done. `repeat`: it may be done twice."""
+        with self.request_later(service, value, timeout, repeat=repeat) as pending:
+            return pending.receive()
+
+    def request_later(self, service: str, value: Any, timeout: float = 5.0, *, repeat: bool = False) -> Pending:
+        """Asks and does not wait. `timeout` ends the request; close() cancels it."""
+        data, size, keeps = messages.payload(value)
+        block = _c.gimi_bytes(ctypes.cast(data, ctypes.c_void_p), size)
+        options = sized(_c.gimi_request_options, timeout_ms=to_ms(timeout), repeat=repeat)
+        try:
+            return Pending(self, self._opened(_c.lib.gimi_ask_later, to_text(service), block, options))
+        except errors.GimnetError as error:
+            error.ran = "no"
+            raise
+        finally:
+            del keeps
+
+    def find(self, name: str, timeout: float = 5.0) -> Peer:
+        """A node by its name, or by its id as text (`7.17`). NotFound, BadName, Timeout."""
+        peer = ctypes.c_uint32()
+        self.check(_c.lib.gimi_find(self._handle, to_text(name), to_ms(timeout), peer))
+        return Peer(peer.value)
+
+    def nodes(self, pattern: str = "", timeout: float = 5.0) -> List[NodeRecord]:
+        """Those whose name matches (`*` one part, `**` any number); "": all."""
+        return [NodeRecord.of(raw) for raw in self._list(_c.lib.gimi_nodes, _c.gimi_node_record, pattern, timeout)]
+
+    def services(self, pattern: str = "", timeout: float = 5.0) -> List[ServiceRecord]:
+        """Those whose full name matches."""
+        return [ServiceRecord.of(raw) for raw in self._list(_c.lib.gimi_services, _c.gimi_service_record, pattern, timeout)]
+
+    def _list(self, function: Any, record: Type[Raw], pattern: str, timeout: float) -> Iterator[Raw]:
+        """Each is valid until the next one."""
+        records = _c.gimi_list()
+        self.check(function(self._handle, to_text(pattern), to_ms(timeout), records))
+        try:
+            for index in range(records.count):
+                raw = record()
+                errors.check(_c.lib.gimi_list_get(records, index, ctypes.addressof(raw), ctypes.sizeof(raw)))
+                yield raw
+        finally:
+            _c.lib.gimi_list_release(records)
+
+    def watch(self, pattern: str = "**", *, nodes: bool = True, services: bool = True, timeout: float = 5.0) -> Watch:
+        """Tells of the nodes and services that match: first what is there, then what changes."""
+        subjects = nodes * _c.GIMI_WATCH_NODES | services * _c.GIMI_WATCH_SERVICES
+        if not subjects:
+            raise errors.BadArgument("a watch needs a subject: nodes, services, or both")
+        return Watch(self, self._opened(_c.lib.gimi_watch, to_text(pattern), subjects, to_ms(timeout)))
+
+    def receive(self, timeout: Optional[float] = None) -> Message:
+        """The message that waited longest, of those that no accepted service or subscription takes too."""
+        raw = _c.gimi_message()
+        self.wait(timeout, lambda ms: _c.lib.gimi_receive(self._handle, ms, raw))
+        return messages.taken(raw)
+
+
+def connect(name: str = "", *, hub: str = "", description: str = "", timeout: float = 5.0, wait_for_hub: bool = False) -> Node:
+    """Joins the network under that name, or without one. `hub`: `tcp://host:port` or `unix:/path`; "":
+    GIMNET_HUB, else the hub of this machine. NoHub, NameTaken, BadName, Timeout, ..."""
+    options = sized(_c.gimi_node_options, name=to_text(name), hub=to_text(hub), description=to_text(description),
+                     timeout_ms=to_ms(timeout), wait_for_hub=wait_for_hub)
+    handle = ctypes.c_uint64()
+    errors.check(_c.lib.gimi_join(options, handle))
+    return Node(handle.value)

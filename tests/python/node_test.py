@@ -1,0 +1,265 @@
+#!/usr/bin/env python3
+"""Nodes in Python, through a hub: what is published, sent and told arrives; waiting ends as it should."""
+
+import collections
+import gc
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+import unittest
+import weakref
+
+import gimnet
+from support.processes import Hub
+from support.waiting import PATIENCE_S, wait_until
+
+
+def program(lines, hub, *arguments):
+    """A Python program with a node `node` named `name`."""
+    text = f"import gimnet, os, sys, threading\nnode = gimnet.connect('{arguments[0]}', hub={hub.url!r})\n{lines}"
+    return subprocess.Popen([sys.executable, "-c", text], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                            text=True)
+
+
+class Nodes(unittest.TestCase):
+    def setUp(self):
+        self.hub = Hub(self)
+        self.robot = self.node("robot")
+        self.viewer = self.node("viewer")
+
+    def node(self, name):
+        node = gimnet.connect(name, hub=self.hub.url)
+        self.addCleanup(node.close)
+        return node
+
+    def pair(self, name, **how):
+        publisher = self.robot.advertise(name, **how)
+        subscription = self.viewer.subscribe(f"robot/{name}")
+        publisher.wait_for_subscribers(1, PATIENCE_S)
+        return publisher, subscription
+
+    def test_publishes_dictionaries_text_and_buffers(self):
+        publisher, subscription = self.pair("pose")
+        large = bytearray(b"\x07" * 200_000)
+        for value in ({"x": 1.5}, "ä", b"\x00\x01", bytearray(b"ab"), memoryview(large), memoryview(b"abcd")[::2], b""):
+            self.assertIs(publisher.publish(value), True)
+        got = [subscription.receive(PATIENCE_S) for _ in range(7)]
+        self.assertEqual(got[0].value, {"x": 1.5})
+        self.assertEqual(got[1].text, "ä")
+        self.assertEqual([bytes(message.data) for message in got[2:]], [b"\x00\x01", b"ab", bytes(large), b"ac", b""])
+        self.assertEqual((got[0].service, got[0].sender, got[0].sequence), ("robot/pose", self.robot.id, 1))
+        self.assertLess(abs(got[0].arrival - time.time()), PATIENCE_S)
+        self.assertLessEqual(got[0].sent, got[0].arrival)
+        with self.assertRaises(TypeError):
+            publisher.publish(1)
+        with self.assertRaises(gimnet.BitestreamError):
+            publisher.publish({"x": None})
+
+    def test_data_outlive_message_subscription_and_node(self):
+        publisher, subscription = self.pair("image")
+        for number in range(20):
+            publisher.publish(bytes([number]) * (100 if number % 2 else 100_000))
+        views = [subscription.receive(PATIENCE_S).data for _ in range(20)]
+        kept = views[::3]
+        self.viewer.close()
+        del views, subscription
+        gc.collect()
+        self.assertEqual([(view[0], view[-1], view.readonly) for view in kept],
+                         [(number, number, True) for number in range(0, 20, 3)])
+
+    def test_sends_commands_to_a_service_and_to_a_peer(self):
+        drive = self.robot.accept("drive")
+        self.viewer.send("robot/drive", {"v": 0.5})
+        self.assertEqual(drive.receive(PATIENCE_S).value, {"v": 0.5})
+        self.viewer.send(self.viewer.find("robot"), "hello")
+        message = self.robot.receive(PATIENCE_S)
+        self.assertEqual((message.text, message.service, str(message.sender)), ("hello", "", str(self.viewer.id)))
+        with self.assertRaises(gimnet.NotFound):
+            self.viewer.send("robot/nothing", "x")
+
+    def test_asks_and_answers(self):
+        add = self.robot.answer("add")
+
+        def handle(request):
+            if "fail" in request.value:
+                request.fail(7, "no numbers")
+            elif "let go" not in request.value:
+                request.reply({"sum": sum(request.value["numbers"])})
+
+        server = threading.Thread(target=lambda: collections.deque(map(handle, add), 0))
+        server.start()
+        reply = self.viewer.request("robot/add", {"numbers": [1, 2]}, PATIENCE_S)
+        self.assertEqual((reply.value, reply.sender), ({"sum": 3}, self.robot.id))
+        for question, wrong, ran, code in (({"fail": True}, gimnet.Failed, "yes", 7), ({"let go": True}, gimnet.Gone, "maybe", 0)):
+            with self.assertRaises(wrong) as raised:
+                self.viewer.request("robot/add", question, PATIENCE_S)
+            self.assertEqual((raised.exception.ran, raised.exception.code), (ran, code))
+        pending = [self.viewer.request_later("robot/add", {"numbers": [number]}, PATIENCE_S) for number in range(10)]
+        self.assertEqual([one.receive(PATIENCE_S).value["sum"] for one in pending], list(range(10)))
+        add.close()
+        server.join(PATIENCE_S)
+        self.assertFalse(server.is_alive())
+
+    def test_a_request_that_nobody_takes_times_out(self):
+        answers = self.robot.answer("add")
+        with self.viewer.request_later("robot/add", "x", 0.3) as pending:
+            with self.assertRaises(gimnet.Timeout) as raised:
+                pending.receive(0)
+            self.assertEqual(raised.exception.ran, "")
+            with self.assertRaises(gimnet.Timeout) as raised:
+                pending.receive()
+            self.assertEqual(raised.exception.ran, "maybe")
+        answers.close()
+        with self.assertRaises(gimnet.NotFound) as raised:
+            self.viewer.request("robot/nothing", "x", 0.3)
+        self.assertEqual(raised.exception.ran, "no")
+
+    def test_lists_and_watches_nodes_and_services(self):
+        watch = self.viewer.watch("robot/*")
+        self.pair("pose", delivery="sync", window=2, metadata="m")
+        event = next(event for event in watch if event.service)
+        self.assertEqual((event.service.name, event.service.delivery, event.service.window), ("robot/pose", "sync", 2))
+        self.assertEqual([node.name for node in self.viewer.nodes()], ["robot", "viewer"])
+        service, = self.viewer.services("robot/**")
+        self.assertEqual((service.metadata, service.accepts, service.node), ("m", False, self.robot.id))
+        state = self.viewer.state()
+        self.assertEqual((state.name, state.connected, state.ended), ("viewer", True, False))
+
+    def test_errors_are_classes_with_sentences(self):
+        for wrong, call in ((gimnet.NameTaken, lambda: gimnet.connect("robot", hub=self.hub.url)),
+                            (gimnet.NoHub, lambda: gimnet.connect(hub="tcp://127.0.0.1:1")),
+                            (gimnet.BadName, lambda: gimnet.connect("a b", hub=self.hub.url)),
+                            (gimnet.BadName, lambda: self.robot.advertise("x" * 300)),
+                            (gimnet.BadArgument, lambda: gimnet.connect("a\0b", hub=self.hub.url)),
+                            (gimnet.BadArgument, lambda: self.viewer.subscribe("robot/a", timeout=float("nan"))),
+                            (gimnet.BadArgument, lambda: self.viewer.receive(-1)),
+                            (gimnet.BadArgument, lambda: self.viewer.receive(float("nan"))),
+                            (gimnet.BadArgument, lambda: self.viewer.subscribe("robot/a", rate_hz=float("nan"))),
+                            (gimnet.BadArgument, lambda: self.robot.advertise("a", delivery="often")),
+                            (gimnet.NotFound, lambda: self.viewer.find("nobody"))):
+            with self.assertRaises(wrong) as raised:
+                call()
+            self.assertGreater(len(str(raised.exception)), 15)
+        self.assertIsInstance(raised.exception, LookupError)
+
+    def test_receive_raises_timeout_and_closed(self):
+        _, subscription = self.pair("pose")
+        with self.assertRaisesRegex(gimnet.Timeout, "within 0.06 s"):
+            subscription.receive(0.06)
+        with self.assertRaises(TimeoutError):
+            subscription.receive(0)
+        waiting = threading.Thread(target=lambda: list(subscription))
+        waiting.start()
+        subscription.close()
+        subscription.close()
+        waiting.join(PATIENCE_S)
+        self.assertFalse(waiting.is_alive())
+        with self.assertRaises(gimnet.Closed):
+            subscription.receive(0)
+
+    def test_publish_returns_false_while_the_hub_is_away(self):
+        publisher, _ = self.pair("pose")
+        self.hub.process.signal(signal.SIGKILL)
+        self.hub.process.wait()
+        wait_until(lambda: not publisher.publish("x", timeout=0), "a message that was not sent")
+        self.assertFalse(self.robot.state().connected)
+
+    def test_nodes_that_nobody_has_leave(self):
+        node = gimnet.connect("short", hub=self.hub.url)
+        publisher = node.advertise("a")
+        gone = weakref.ref(node)
+        peer = node.id
+        del node
+        self.assertEqual(self.viewer.find("short"), peer, "its publisher holds it")
+        del publisher
+        gc.collect()
+        self.assertIsNone(gone())
+        with self.assertRaises(gimnet.NotFound):
+            wait_until(lambda: self.viewer.find("short") is None, "never")
+
+
+class Endings(unittest.TestCase):
+    def setUp(self):
+        self.hub = Hub(self)
+
+    def ends(self, process, code, noise=""):
+        out, err = process.communicate(timeout=PATIENCE_S)
+        self.assertEqual((process.returncode, err), (code, noise), out)
+        return out
+
+    def test_ctrl_c_ends_a_wait(self):
+        process = program("print('ready', flush=True)\ntry: node.receive()\nexcept KeyboardInterrupt: print('ended')", self.hub, "a")
+        self.assertEqual(process.stdout.readline(), "ready\n")
+        process.send_signal(signal.SIGINT)
+        self.assertEqual(self.ends(process, 0), "ended\n")
+
+    def test_a_program_may_end_without_close_and_with_threads_that_wait(self):
+        waits = "s = node.subscribe('x/y')\nt = threading.Thread(target=s.receive)\nt.start()\n"
+        ended = [program(waits, self.hub, "a"), program(waits + "sys.exit(3)", self.hub, "b"),
+                 program(waits + "t.daemon\nraise KeyError('k')", self.hub, "c")]
+        self.ends(ended[0], 0)
+        self.ends(ended[1], 3)
+        self.assertIn("KeyError: 'k'", ended[2].communicate(timeout=PATIENCE_S)[1])
+        with gimnet.connect("viewer", hub=self.hub.url) as viewer:
+            self.assertEqual([node.name for node in viewer.nodes()], ["viewer"])
+
+    def test_a_child_of_fork_connects_anew(self):
+        lines = """
+publisher = node.advertise("p")
+if os.fork() == 0:
+    for call in (lambda: publisher.publish("x"), node.state, lambda: node.subscribe("a/b")):
+        try: call()
+        except gimnet.Forked: print("forked")
+    with gimnet.connect("child", hub=%r) as child: print(child.find("a") == node.id or child.find("a"))
+    sys.exit(0)
+os.wait()
+print(publisher.publish("x"))
+""" % self.hub.url
+        out = self.ends(program(lines, self.hub, "a"), 0).split()
+        self.assertEqual((out[:3], out[-1]), (["forked"] * 3, "True"))
+        self.assertEqual(len(out), 5)
+
+    def test_multiprocessing_works_in_each_way_to_start(self):
+        for method in ("fork", "spawn", "forkserver"):
+            with self.subTest(method):
+                lines = f"""
+import multiprocessing
+from operator import methodcaller
+if __name__ == "__main__":
+    context = multiprocessing.get_context({method!r})
+    with context.Pool(1) as pool:
+        print(pool.apply(eval, ("__import__('gimnet').connect('child', hub={self.hub.url!r}).name",)))
+"""
+                self.assertEqual(self.ends(program(lines, self.hub, "a"), 0), "child\n")
+
+    def test_programs_that_start_and_end_leave_nothing(self):
+        """A third of them is killed; the next one of that name takes its place."""
+        for number in range(1000 if os.environ.get("GIMNET_STRESS") == "full" else 20):
+            process = program("print('ready', flush=True)\nsys.stdin.read()", self.hub, "n")
+            self.assertEqual(process.stdout.readline(), "ready\n", process.stderr)
+            if number % 3 == 0:
+                process.kill()
+                process.communicate(timeout=PATIENCE_S)
+            else:
+                process.stdin.close()
+                self.assertEqual((process.wait(PATIENCE_S), process.stderr.read()), (0, ""))
+                process.stdout.close()
+                process.stderr.close()
+        with gimnet.connect("n", hub=self.hub.url) as last:
+            self.assertEqual([node.name for node in last.nodes()], ["n"])
+
+    def test_a_thousand_handles_leave_no_thread_or_descriptor(self):
+        with gimnet.connect("n", hub=self.hub.url) as node:
+            before = [len(os.listdir(f"/proc/self/{kind}")) for kind in ("task", "fd")]
+            for number in range(1000):
+                node.advertise(f"s{number % 10}").close()
+            for number in range(20):
+                gimnet.connect(hub=self.hub.url).close()
+            self.assertEqual([len(os.listdir(f"/proc/self/{kind}")) for kind in ("task", "fd")], before)
+
+
+if __name__ == "__main__":
+    unittest.main()
