@@ -6,8 +6,9 @@
  *
  *     gimi_reply reply;
  *     const gimi_bytes numbers = {"1 2", 3};
- *     if (gimi_ask(node, "calc/add", &numbers, NULL, &reply) == GIMI_OK) show(reply.data,
- * reply.size); gimi_reply_release(&reply);
+ *     if (gimi_ask(node, "calc/add", &numbers, NULL, &reply) == GIMI_OK)
+ *       show(reply.data, reply.size);
+ *     gimi_reply_release(&reply);
  *
  *     gimi_request request;
  *     gimi_answer(node, "add", NULL, &add);  // calc/add

@@ -34,10 +34,14 @@ class Page:
 
 
 GIMI = '#include <iostream>\n#include <vector>\n#include "gimnet/gimi.hpp"\ntemplate <class... Parts>\nvoid show(const Parts&...) {}\n'
+GIMI_C = '#include <stdio.h>\n#include "gimnet/gimi.h"\nvoid show(const void* data, size_t size);\n'
 PAGES = {
     "README.md": Page("c++", GIMI),
-    "docs/gimi.md": Page("c++", GIMI + "void stop();\nvoid forget_all();\n", "std::vector<std::byte> pixels;\n"),
+    "docs/gimi.md": Page("c++", GIMI + "void stop();\nvoid forget_all();\nstd::string sum_of(std::string_view numbers);\n",
+                         "std::vector<std::byte> pixels;\ngimnet::Node calc(\"calc\");\n"),
     "docs/nif.md": Page("c", '#include <stdio.h>\n#include "gimnet/nif.h"\n', "uint32_t peer = 1;\nnif_node* node = NULL;\n"),
+    "include/gimnet/gimi.h": Page("c", GIMI_C),
+    "include/gimnet/gimi_requests.h": Page("c", GIMI_C, "gimi_handle node = 0, add = 0;\n"),
     "include/gimnet/gimi.hpp": Page("c++", GIMI),
     "include/gimnet/nif.h": Page("c", '#include <stdio.h>\n#include "gimnet/nif.h"\nvoid show(const nif_incoming* in);\n',
                                  "uint32_t peer = 1;\n"),
