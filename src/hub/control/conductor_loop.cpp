@@ -221,6 +221,8 @@ struct ConductorLoop::Impl {
     if (wiring.conductor.has_garbage()) sooner(now() + kCollectEvery);
     if (!deadline) return;
     sooner(now() + Conductor::kLookEvery);
+    // What is due at once has no time.
+    deadline = std::max(*deadline, now());
     if (armed && *armed <= *deadline) return;
     armed = deadline;
     timer.expires_after(std::max(*deadline - now(), milliseconds{0}) + milliseconds{1});

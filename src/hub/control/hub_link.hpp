@@ -92,6 +92,9 @@ class HubLink {
   /// As the shard knows it; nothing: it does not.
   [[nodiscard]] std::optional<std::chrono::nanoseconds> told_ahead() const { return told_ahead_; }
 
+  /// The other side dialled it, and has given it up.
+  [[nodiscard]] bool is_over() const { return !connected_ && !place && !is_dialled(); }
+
   // Dialling. REQUIRES: is_dialled().
   [[nodiscard]] std::optional<std::chrono::milliseconds> dial_at() const { return dial_at_; }
   void dial_after(std::chrono::milliseconds pause, std::chrono::milliseconds now) {

@@ -255,7 +255,7 @@ void Links::tick(Moment moment) {
   std::vector<LinkNumber> gone;
   for (const auto& [number, link] : links_) {
     if (link->resume_until() && *link->resume_until() <= moment.now) withdraw(*link);
-    if (!link->connected() && !link->place && !link->is_dialled()) gone.push_back(number);
+    if (link->is_over()) gone.push_back(number);
     if (link->damped_until() && *link->damped_until() <= moment.now) {
       link->end_damping();
       network_.set_damped(number, false);
@@ -280,7 +280,7 @@ std::optional<milliseconds> Links::next_deadline() const {
     note(link->resume_until());
     note(link->damped_until());
     if (!draining_) note(link->dial_at());
-    if (link->connected()) note(link->keep_alive_at());
+    if (link->connected() || link->is_over()) note(link->keep_alive_at());
   }
   return due;
 }

@@ -185,6 +185,15 @@ TEST(Links, TheLastOneThatIsRemovedLeavesNobodyReachable) {
   EXPECT_EQ(hubs.b.links.network().map().reachable().size(), 1u);
 }
 
+TEST(Links, OneThatTheOtherSideGaveUpIsForgotten) {
+  LinkedRigs hubs;
+  hubs.link();
+  hubs.a.detach(hubs.a.attached(), GoodbyeCode::done, true);
+  ASSERT_TRUE(hubs.a.links.next_deadline()) << "nothing else may come for long";
+  hubs.a.pass(milliseconds{1});
+  EXPECT_TRUE(hubs.a.links.all().empty());
+}
+
 TEST(Links, KeepAlivesMeasureTheRoundTripAndTheOtherClock) {
   LinkedRigs hubs;
   hubs.a.clock_ahead_ns = 5'000'000'000;
