@@ -191,7 +191,7 @@ class Endings(unittest.TestCase):
         return out
 
     def test_ctrl_c_ends_a_wait(self):
-        process = program("print('ready', flush=True)\ntry: node.receive()\nexcept KeyboardInterrupt: print('ended')", self.hub, "a")
+        process = program("try:\n print('ready', flush=True)\n node.receive()\nexcept KeyboardInterrupt: print('ended')", self.hub, "a")
         self.assertEqual(process.stdout.readline(), "ready\n")
         process.send_signal(signal.SIGINT)
         self.assertEqual(self.ends(process, 0), "ended\n")

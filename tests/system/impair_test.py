@@ -59,11 +59,11 @@ class Behind(unittest.TestCase):
             sender.popen.stdin.write(b"".join(b"%d\n" % i for i in range(100 * part, 100 * part + 100)))
             sender.popen.stdin.flush()
             wait_until(lambda: receiver.out.count(b"\n") == 100 * part + 100, "a hundred lines")
-            self.assertEqual(self.order("cut"), "ok")
+            if part < 2:  # then the receiver leaves, and a cut may take its last acknowledgements along
+                self.assertEqual(self.order("cut"), "ok")
         sender.popen.stdin.close()
         self.assertEqual((receiver.wait(), sender.wait()), (0, 0), receiver.err + sender.err)
         self.assertEqual(receiver.out, b"".join(b"%d\n" % i for i in range(300)))
-        # The receiver may be done before the third.
         self.assertGreaterEqual(json.loads(self.order("status"))["cut"], 2)
 
     def test_a_wrong_order_is_told_and_changes_nothing(self):

@@ -31,7 +31,8 @@ void Settled::ask_names() {
   }
   for (SimNode& person : world_.operators_) {
     if (!person.is_up())
-      broken(Checker::reachable, "hub " + std::to_string(person.plan().hub) + " serves nobody");
+      broken(Checker::reachable, "hub " + std::to_string(person.plan().hub) +
+                                     " serves nobody: its operator " + person.last());
     for (const std::string& name : names_) person.resolve(name, {});
   }
 }
@@ -128,7 +129,7 @@ void Settled::check_rest() {
         broken(Checker::resumes, "a connection is held, or holds others");
     }
     for (const auto& [number, link] : machine.hub->links().all())
-      if (!link->is_dialled() && !link->connected() && !link->place)
+      if (!world_.plan_.collisions && !link->is_dialled() && !link->connected() && !link->place)
         broken(Checker::bounded, "a hub keeps a link that nobody dials");
     const hub::ShardCounters& counters = machine.hub->counters();
     if (counters.dropped[static_cast<std::size_t>(proto::DropReason::link_unsure)].value() != 0)

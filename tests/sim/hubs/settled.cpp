@@ -19,6 +19,7 @@ std::string words_of(std::size_t from, std::size_t to) {
 bool Settled::waits(World& world) {
   if (world.copied_at_ && *world.copied_at_ + kCopyWaits > world.now()) return true;
   for (const Machine& machine : world.machines_) {
+    if (machine.hub == nullptr || machine.hub->drains()) return true;
     for (const auto& [number, link] : machine.hub->links().all()) {
       if (link->damped_until()) return true;
     }

@@ -56,6 +56,7 @@ void SimHub::step(milliseconds now) {
   if (stepped_ && now - *stepped_ > hub::Conductor::kLookEvery)
     conductor_.stood_still(now - *stepped_, now);
   stepped_ = now;
+  if (conductor_.drain_wanted()) drain();
   for (int round = 0; round < kRoundsMost; ++round) {
     const bool turned = turn(now);
     if (!take_events(now) && !turned) break;

@@ -56,7 +56,14 @@ class SimHub {
   void on_dialled(hub::LinkNumber link, std::unique_ptr<net::Stream> stream, hub::MemoryPeer peer,
                   const proto::Welcome& welcome, milliseconds now);
   void on_not_dialled(hub::LinkNumber link, net::NetError error, milliseconds now);
-  void drain() { conductor_.drain(); }
+  void drain() {
+    drains_ = true;
+    conductor_.drain();
+  }
+  /// It ends within its time to drain, also where a link does not take what waits.
+  [[nodiscard]] bool drains() const { return drains_; }
+  /// The id with which it is to begin anew once it has drained.
+  [[nodiscard]] std::optional<HubId> redrawn() const { return conductor_.redrawn(); }
   [[nodiscard]] bool drained() const { return conductor_.drained(); }
 
   [[nodiscard]] const hub::HubFacts& facts() const { return setup_.facts; }
@@ -111,6 +118,7 @@ class SimHub {
   std::optional<milliseconds> stepped_;  ///< the last time
   milliseconds turn_at_{0};
   bool more_to_tell_ = false;
+  bool drains_ = false;
 };
 
 }  // namespace gimnet::sim::hubs

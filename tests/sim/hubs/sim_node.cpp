@@ -16,6 +16,8 @@ using proto::Lane;
 /// A request that another hub does not answer is answered by the own hub after 5 s, on a clock that
 /// may have stood still.
 constexpr milliseconds kAnswerMost{9'000};
+/// A node is heard of though the hub has no reason to ask.
+constexpr milliseconds kSpeaksEvery{1'000};
 constexpr milliseconds kPauseOfAnotherHub{1'000};
 constexpr std::size_t kAskedMost = 16;
 constexpr std::uint64_t kSmallBytes = 100;
@@ -32,6 +34,7 @@ void SimNode::step(SimHub* hub, milliseconds now, std::uint64_t says_every) {
   read(now);
   std::erase_if(paused_, [now](const auto& each) { return each.second && *each.second <= now; });
   if (!is_up()) return;
+  if (now % kSpeaksEvery == milliseconds{0}) say_flow(proto::flow::Pong{});
   if (says_every != 0 && now >= say_at_) {
     say_at_ = now + milliseconds{around_.random.between(1, 2 * says_every)};
     say();
@@ -60,6 +63,7 @@ void SimNode::join(SimHub& hub, milliseconds now) {
   back_at_ = now + milliseconds{around_.random.between(50, 500)};
   if (refused) {
     around_.census.note(Event::refused_name);
+    last_ = "was refused at " + std::to_string(now.count()) + ": " + refused->sentence;
     token_.clear();
     wants_name_ = around_.random.chance(500);
     return;
@@ -106,7 +110,7 @@ void SimNode::read(milliseconds now) {
   }
   stream_.erase(stream_.begin(), stream_.begin() + static_cast<std::ptrdiff_t>(next));
   if (!gone || more) return;
-  last_ = "lost its connection at " + std::to_string(now.count());
+  last_ = "lost its connection at " + std::to_string(now.count()) + goodbye_;
   up_ = false;
   back_at_ = now + milliseconds{around_.random.between(20, 500)};
 }
@@ -130,6 +134,8 @@ void SimNode::take(const proto::FrameHeader& header, std::span<const std::byte> 
         name_ = welcome->name;
         token_ = welcome->token;
         if (!administers_ && around_.random.chance(400)) offer();
+      } else if (const auto goodbye = proto::decode<proto::Goodbye>(payload)) {
+        goodbye_ = ": " + goodbye->sentence;
       }
       return;
     default:
@@ -137,13 +143,16 @@ void SimNode::take(const proto::FrameHeader& header, std::span<const std::byte> 
   }
 }
 
+void SimNode::say_flow(const proto::flow::Message& message) {
+  std::byte bytes[proto::flow::kFrameSizeMax];
+  pipe_.write({bytes, proto::flow::encode_frame(message, id_, bytes)});
+}
+
 void SimNode::take_flow(std::span<const std::byte> payload) {
   const auto message = proto::flow::decode(payload);
   if (!message) return;
   if (const auto* ping = std::get_if<proto::flow::Ping>(&*message)) {
-    std::byte bytes[proto::flow::kFrameSizeMax];
-    const proto::flow::Pong pong{ping->sequence, ping->sent_ns, ping->sent_ns};
-    pipe_.write({bytes, proto::flow::encode_frame(pong, id_, bytes)});
+    say_flow(proto::flow::Pong{ping->sequence, ping->sent_ns, ping->sent_ns});
   } else if (const auto* pause = std::get_if<proto::flow::Pause>(&*message)) {
     around_.census.note(Event::paused_sender);
     const bool elsewhere = hub_of(NodeId{pause->target.dst}) != hub_of(id_);

@@ -64,6 +64,7 @@ class SimNode {
   void offer();
   void read(milliseconds now);
   void take(const proto::FrameHeader& header, std::span<const std::byte> payload);
+  void say_flow(const proto::flow::Message& message);
   void take_flow(std::span<const std::byte> payload);
   void take_control(std::span<const std::byte> payload);
   void write(proto::Kind kind, std::uint32_t dst, std::span<const std::byte> payload,
@@ -75,6 +76,7 @@ class SimNode {
   const NodePlan plan_;
   const bool administers_;
   std::string last_;  ///< how its last connection ended
+  std::string goodbye_;
   bool up_ = false;
   bool welcomed_ = false;
   hub::MemoryPeer pipe_;

@@ -106,6 +106,7 @@ void World::step() {
     if (each == nullptr) continue;
     each->step(now_);
     if (!each->drained()) continue;
+    if (const auto redrawn = each->redrawn()) machines_[machine].plan.hub = redrawn->value();
     stop(machine);
     after_ms(random_.below(500), [this, machine] { start(machine); });
   }
