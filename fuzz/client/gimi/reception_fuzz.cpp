@@ -37,9 +37,12 @@ class World final : public nif::InboundHost {
       : inbox_(64, 1 << 20, [] {}),
         streams_(uplink_, [](bool) {}),
         services_(uplink_, inbox_, [](const std::string&, const ServicePlace&) {}),
-        clerk_(uplink_, streams_),
-        reception_({uplink_, inbox_, streams_, services_, pings_, clerk_, losses_},
-                   kMessageBytesMax),
+        requests_(uplink_, [] {}),
+        answers_(uplink_),
+        clerk_(uplink_, streams_, &requests_),
+        reception_(
+            {uplink_, inbox_, streams_, services_, pings_, requests_, answers_, clerk_, losses_},
+            kMessageBytesMax),
         queue_(inbox_.queue(kKey, nullptr)),
         inbound_(kLimits, *this) {
     nif::Session session;
@@ -100,6 +103,8 @@ class World final : public nif::InboundHost {
   StreamTable streams_;
   ServiceTable services_;
   PingTable pings_;
+  OpenRequests requests_;
+  AnswerTable answers_;
   Clerk clerk_;
   LossTally losses_;
   Reception reception_;
