@@ -120,6 +120,8 @@ enum { GIMI_STREAM = 0, GIMI_LATEST = 1, GIMI_SYNC = 2 };
 /** A service gives data to its subscribers, or takes data that others send to it. */
 typedef int32_t gimi_direction;
 enum { GIMI_PROVIDES = 0, GIMI_ACCEPTS = 1, GIMI_NOBODY = -1 };
+/** The message type of an accepting service that answers requests. */
+#define GIMI_REQUEST_TYPE 0x54534551u
 
 /** The behaviour of a full queue when a message comes. */
 typedef int32_t gimi_at_full_queue;

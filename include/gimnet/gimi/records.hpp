@@ -46,6 +46,11 @@ struct ServiceRecord {
   std::string hub_name;
   std::uint32_t window = 0;  ///< of delivery sync
   bool retain = false;       ///< a new subscriber gets the last message first
+
+  /// It answers requests.
+  [[nodiscard]] bool answers() const {
+    return direction == Direction::accepts && key.type == GIMI_REQUEST_TYPE;
+  }
 };
 
 /// The kinds of events of a watch.

@@ -57,6 +57,8 @@ bool is_away(Core& core, const std::string& service, std::int64_t deadline_ns) {
 }
 
 /// Finds who answers a service. While its node is away it waits for it.
+static_assert(GIMI_REQUEST_TYPE == proto::gimi::kRequestType);
+
 Outcome<void> reach(Core& core, const std::string& service, std::int64_t deadline_ns) {
   while (!core.requests().knows(service)) {
     bool answers = true;

@@ -240,7 +240,7 @@ std::string table_of(const std::vector<ServiceRecord>& services, const Places& p
     table.add({service.name, service.node.text(), service.hub_name,
                std::string(places.of(service.node)),
                std::to_string(service.key.type) + "/" + std::to_string(service.key.instance),
-               text_of(service.direction), delivery_of(service), service.retain ? "yes" : "no",
+               direction_of(service), delivery_of(service), service.retain ? "yes" : "no",
                std::to_string(service.subscribers), service.metadata});
   }
   return table.text(paint);

@@ -116,8 +116,9 @@ void JsonWriter::quote(std::string_view text) {
   json_ += '"';
 }
 
-const char* text_of(Direction direction) {
-  return direction == Direction::accepts ? "accepts" : "provides";
+const char* direction_of(const ServiceRecord& service) {
+  if (service.answers()) return "answers";
+  return service.direction == Direction::accepts ? "accepts" : "provides";
 }
 std::string delivery_of(const ServiceRecord& service) {
   if (service.delivery == Delivery::sync) return "sync:" + std::to_string(service.window);
@@ -136,7 +137,7 @@ void write(JsonWriter& json, const NodeRecord& node) {
 void write(JsonWriter& json, const ServiceRecord& service, std::optional<std::string_view> place) {
   json.begin_object().member("name", service.name).member("node", service.node.text());
   json.member("type", service.key.type).member("instance", service.key.instance);
-  json.member("direction", text_of(service.direction)).member("delivery", delivery_of(service));
+  json.member("direction", direction_of(service)).member("delivery", delivery_of(service));
   json.member("retain", service.retain);
   json.member("group", service.group_id).member("subscribers", service.subscribers);
   json.member("metadata", service.metadata).member("hub", service.hub_name);

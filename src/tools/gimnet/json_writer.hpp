@@ -62,7 +62,8 @@ void write(JsonWriter& json, const NodeRecord& node);
 void write(JsonWriter& json, const ServiceRecord& service,
            std::optional<std::string_view> place = std::nullopt);
 
-[[nodiscard]] const char* text_of(Direction direction);
+/// "provides", "accepts", or "answers" of one that answers requests.
+[[nodiscard]] const char* direction_of(const ServiceRecord& service);
 /// As `pub --delivery` takes it.
 [[nodiscard]] std::string delivery_of(const ServiceRecord& service);
 

@@ -77,6 +77,10 @@ TEST(RecordJson, OfAService) {
   JsonWriter placed;
   write(placed, service, "127.0.0.1:4000");
   EXPECT_TRUE(placed.str().ends_with(R"("hub":"lab","place":"127.0.0.1:4000"})")) << placed.str();
+  service.direction = Direction::accepts;
+  EXPECT_STREQ(direction_of(service), "accepts");
+  service.key.type = GIMI_REQUEST_TYPE;
+  EXPECT_STREQ(direction_of(service), "answers");
 }
 
 }  // namespace
