@@ -2,7 +2,7 @@
 
 option(GIMNET_WARNINGS_AS_ERRORS "Stop at the first warning: on in this project's own presets" OFF)
 option(GIMNET_CCACHE "Compile through ccache" "$ENV{GIMNET_CCACHE}")
-option(GIMNET_MOLD "Link with mold" "$ENV{GIMNET_MOLD}")
+option(GIMNET_LLD "Link with lld" "$ENV{GIMNET_LLD}")
 
 add_library(gimnet_options INTERFACE)
 target_compile_features(gimnet_options INTERFACE cxx_std_20)  # of the headers, for other projects
@@ -50,9 +50,9 @@ if(GIMNET_CCACHE)
   set(CMAKE_C_COMPILER_LAUNCHER ccache)
   set(CMAKE_CXX_COMPILER_LAUNCHER ccache)
 endif()
-if(GIMNET_MOLD)
-  gimnet_need_program(GIMNET_MOLD ld.mold mold)
-  add_link_options(-fuse-ld=mold)
+if(GIMNET_LLD)
+  gimnet_need_program(GIMNET_LLD ld.lld lld)
+  add_link_options(-fuse-ld=lld)
 endif()
 
 if(CMAKE_CXX_CLANG_TIDY)

@@ -48,7 +48,7 @@ class Configuring(unittest.TestCase):
         return self.cmake("-S", self.folder, "-B", self.folder / "build", "-G", "Ninja", *arguments, **environment)
 
     def test_tells_which_program_of_an_option_is_missing(self):
-        for option, program, package in (("GIMNET_CCACHE", "ccache", "ccache"), ("GIMNET_MOLD", "ld.mold", "mold")):
+        for option, program, package in (("GIMNET_CCACHE", "ccache", "ccache"), ("GIMNET_LLD", "ld.lld", "lld")):
             how = (f"-DCMAKE_MAKE_PROGRAM={shutil.which('ninja')}", *NO_SYSTEM_PROGRAMS)
             environment = {"PATH": str(self.programs), option: "1"}
             with self.subTest(option):
@@ -80,7 +80,7 @@ class Configuring(unittest.TestCase):
 
 
 class WholeProject(unittest.TestCase):
-    """What a plain cmake makes of it, where ccache and mold are installed and nobody asked for them."""
+    """What a plain cmake makes of it, where ccache and lld are installed and nobody asked for them."""
 
     @classmethod
     def setUpClass(cls):
@@ -89,7 +89,7 @@ class WholeProject(unittest.TestCase):
         cls.folder = pathlib.Path(folder.name)
         programs = cls.folder / "programs"
         programs.mkdir()
-        for program, script in (("ccache", 'exec "$@"'), ("ld.mold", 'exec ld "$@"')):
+        for program, script in (("ccache", 'exec "$@"'), ("ld.lld", 'exec ld "$@"')):
             (programs / program).write_text(f"#!/bin/sh\n{script}\n")
             (programs / program).chmod(0o755)
         cls.environment = {name: value for name, value in os.environ.items()
@@ -107,18 +107,18 @@ class WholeProject(unittest.TestCase):
 
     @staticmethod
     def options(build):
-        """Which of the three it builds with: warnings as errors, ccache, mold."""
+        """Which of the three it builds with: warnings as errors, ccache, lld."""
         ninja = "".join((build / name).read_text() for name in ("build.ninja", "CMakeFiles/rules.ninja"))
-        words = {"-Werror": r" -Werror", "ccache": r"\bccache ", "mold": r" -fuse-ld=mold"}
+        words = {"-Werror": r" -Werror", "ccache": r"\bccache ", "lld": r" -fuse-ld=lld"}
         return {name: bool(re.search(word, ninja)) for name, word in words.items()}
 
-    def test_takes_no_warning_for_an_error_and_no_ccache_or_mold_unasked(self):
-        self.assertEqual(self.options(self.plain), {"-Werror": False, "ccache": False, "mold": False})
+    def test_takes_no_warning_for_an_error_and_no_ccache_or_lld_unasked(self):
+        self.assertEqual(self.options(self.plain), {"-Werror": False, "ccache": False, "lld": False})
 
     def test_takes_what_it_is_asked_for(self):
         less = [f"-DGIMNET_{part}=OFF" for part in ("TESTS", "BENCH", "PERF", "EXAMPLES")]
-        asked = self.configure("asked", "-DGIMNET_WARNINGS_AS_ERRORS=ON", *less, GIMNET_CCACHE="1", GIMNET_MOLD="1")
-        self.assertEqual(self.options(asked), {"-Werror": True, "ccache": True, "mold": True})
+        asked = self.configure("asked", "-DGIMNET_WARNINGS_AS_ERRORS=ON", *less, GIMNET_CCACHE="1", GIMNET_LLD="1")
+        self.assertEqual(self.options(asked), {"-Werror": True, "ccache": True, "lld": True})
 
     def inputs(self, target):
         """All that is made or read for the target."""
