@@ -186,6 +186,7 @@ nif_verdict Reception::on_group_data(const nif_incoming& in, const proto::gimi::
   if (step == StreamEpochs::Step::former) return drop_outdated();
   Message message = make_message(in, view, &service->shared_name(), reconnects_);
   if (step == StreamEpochs::Step::begins) message = begin_stream(std::move(message));
+  service->count_missed(position);
   if (!inbox_.put(service->queue(), message, nullptr)) {
     disown(std::move(message));
     return NIF_NOT_NOW;

@@ -225,12 +225,18 @@ StreamEpochs::Step SubscribedService::look(const Position& message) {
   return stream == nullptr ? StreamEpochs::Step::first : stream->epochs.look(message.epoch);
 }
 
-void SubscribedService::on_message(const Position& message) {
+void SubscribedService::count_missed(const Position& message) {
   const MutexLock lock(mutex_);
+  if (message == counted_) return;  // it found no room the last time
+  counted_ = message;
   const auto step = static_cast<std::int32_t>(message.sequence - last_.sequence);
   // The first of a provider, or of an epoch, says where it stands.
   if (message.from == last_.from && message.epoch == last_.epoch && step > 0)
     missed_ += static_cast<std::uint32_t>(step - 1);
+}
+
+void SubscribedService::on_message(const Position& message) {
+  const MutexLock lock(mutex_);
   last_ = message;
   Stream* stream = find(message);
   if (stream == nullptr) {

@@ -113,11 +113,15 @@ class SubscribedService {
     MessageKey key;
     std::uint32_t epoch = 0;
     std::uint32_t sequence = 0;
+    friend bool operator==(const Position&, const Position&) = default;
   };
   /// The message that came last comes once more.
   [[nodiscard]] bool is_repeated(const Position& message) GIMNET_EXCLUDES(mutex_);
   /// What a message would be. Changes nothing.
   [[nodiscard]] StreamEpochs::Step look(const Position& message) GIMNET_EXCLUDES(mutex_);
+  /// One of its messages is about to be put into the queue: whoever takes it knows what is missing
+  /// before it.
+  void count_missed(const Position& message) GIMNET_EXCLUDES(mutex_);
   /// One of its messages is in the queue. REQUIRES: look() is not `former`.
   void on_message(const Position& message) GIMNET_EXCLUDES(mutex_);
   void on_place(const ServicePlace& now) GIMNET_EXCLUDES(mutex_);
@@ -161,6 +165,7 @@ class SubscribedService {
   bool accepts_ GIMNET_GUARDED_BY(mutex_) = false;
   std::optional<Failure> refusal_ GIMNET_GUARDED_BY(mutex_);
   Position last_ GIMNET_GUARDED_BY(mutex_);                ///< from nobody: nothing came yet
+  Position counted_ GIMNET_GUARDED_BY(mutex_);             ///< by count_missed(), last
   std::vector<Stream> streams_ GIMNET_GUARDED_BY(mutex_);  ///< the one that began last is the last
   std::uint64_t missed_ GIMNET_GUARDED_BY(mutex_) = 0;
   Ending end_ GIMNET_GUARDED_BY(mutex_);
