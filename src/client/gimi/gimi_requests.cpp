@@ -13,6 +13,8 @@ using namespace gimnet::gimi;
 
 namespace {
 
+static_assert(GIMI_REQUEST_TYPE == proto::gimi::kRequestType);
+
 struct PendingObject final : Object {
   static constexpr HandleKind kKind = HandleKind::pending;
   PendingObject(SharedCore the_core, std::uint32_t the_number)
@@ -57,8 +59,6 @@ bool is_away(Core& core, const std::string& service, std::int64_t deadline_ns) {
 }
 
 /// Finds who answers a service. While its node is away it waits for it.
-static_assert(GIMI_REQUEST_TYPE == proto::gimi::kRequestType);
-
 Outcome<void> reach(Core& core, const std::string& service, std::int64_t deadline_ns) {
   while (!core.requests().knows(service)) {
     bool answers = true;

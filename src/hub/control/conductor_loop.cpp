@@ -221,7 +221,7 @@ struct ConductorLoop::Impl {
     if (wiring.conductor.has_garbage()) sooner(now() + kCollectEvery);
     if (!deadline) return;
     sooner(now() + Conductor::kLookEvery);
-    // What is due at once has no time.
+    // A time in the far past means "at once".
     deadline = std::max(*deadline, now());
     if (armed && *armed <= *deadline) return;
     armed = deadline;

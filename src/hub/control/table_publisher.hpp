@@ -38,7 +38,7 @@ class TablePublisher {
   /// Publishes who provides the group now, or that there is no such group any more. A new group has
   /// no members yet; those of a known one are shared with the entry that stood there.
   void publish_group(GroupIndex index, const Membership& membership);
-  /// What shards have to know of a group of another hub.
+  /// A group of another hub, as far as shards have to know it.
   struct AwayGroup {
     NodeId provider;  ///< 0: nobody at the moment
     HubId parent;     ///< the neighbour that its messages come from
@@ -85,7 +85,7 @@ class TablePublisher {
   void put(GroupMembers& members, const Topic* topic, NodeIndex subscriber,
            const Membership& membership) const;
   void put(GroupMembers& members, const LinkMember& link) const;
-  /// What stands there now, or an empty list.
+  /// The list that stands there now, or an empty one.
   [[nodiscard]] std::unique_ptr<GroupMembers> copy_of(GroupId group) const;
   void replace(GroupId group, std::unique_ptr<const GroupMembers> members);
 

@@ -85,7 +85,7 @@ class Backoff {
   }
 
  private:
-  // Who just began has shown nothing yet.
+  // A new one has shown nothing yet.
   std::uint8_t pause_ = 7;
   std::uint8_t left_ = 7;  ///< times that it is not worth it
 };

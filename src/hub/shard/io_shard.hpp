@@ -68,9 +68,9 @@ class IoShard {
   void flush();
   void finish_turn();
   void execute(ShardCommand& command);
-  /// Hands a control frame to the connection, or closes it if too many wait.
   /// A request of somebody else, or its answer, on its way over a link.
   void pass_on(Connection& connection, std::span<const std::byte> frame);
+  /// Hands a control frame to the connection, or closes it if too many wait.
   void say(Connection& connection, std::span<const std::byte> frame);
   void tell(TellCommand& command);
   void say_event(Connection& connection, std::span<const std::byte> frame);

@@ -20,7 +20,7 @@
 
 namespace gimnet::hub {
 
-/// What the state machines want to outlive the hub. A value type.
+/// The part of the state machines that is to outlive the hub. A value type.
 struct Durable {
   IndexPool::Grant nodes;
   IndexPool::Grant groups;

@@ -18,7 +18,7 @@
 
 namespace gimnet::hub {
 
-/// What a MAC of the hub covers, field by field, so that no two lists of fields give the same
+/// The fields that a MAC of the hub covers, written so that no two lists of fields give the same
 /// bytes. Thread safety: none.
 class MacText {
  public:

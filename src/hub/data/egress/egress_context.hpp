@@ -15,9 +15,9 @@
 
 namespace gimnet::hub {
 
-/// What belongs to one thread says check_here() wherever it is entered. Debug builds
-/// abort where another thread comes in; release builds check nothing. Thread safety: none, which is
-/// what it finds out.
+/// The owner of an object that belongs to one thread, which calls check_here() wherever it is
+/// entered. Debug builds abort where another thread comes in; release builds check nothing. Thread
+/// safety: none, which is the thing that it finds out.
 class OwnerThread {
  public:
   /// The first that comes is the owner.

@@ -57,7 +57,6 @@ PacedSubscription* Pacer::find(const Recipient& recipient, GroupId group) {
 bool Pacer::offer(PacedSubscription& subscription, const Run& run, const proto::FrameHeader& header,
                   Handover handover) {
   if (subscription.awaits_start) return false;
-  look_at_queue(subscription);
   follow_source(subscription, NodeId{header.src});
   const Recipient& recipient = subscription.recipient();
   if (!recipient.connected && !recipient.waits_when_away) {

@@ -32,7 +32,8 @@ struct PacedMember {
 /// table publisher, which frees it when no shard can still look at it (concurrent/quiescence.hpp).
 struct GroupMembers {
   NodeId provider;  ///< 0: nobody at the moment
-  /// Where its provider's session lives, or the link to the parent: frames to the service go there.
+  /// The place of its provider's session, or the link to the parent: frames to the service go to
+  /// it.
   NodePlace provider_place;
   /// One entry per shard of the hub, each with the members that live there.
   std::vector<MemberList<GroupMember>> by_shard;
@@ -47,9 +48,8 @@ struct GroupMembers {
 };
 
 /// Groups to recipients: those that this hub has, by index, and those of other hubs that somebody
-/// here or behind a link wants. Thread safety: one writer (the
-/// conductor), any number of readers; reads are wait-free. A reader's pointer is good until its
-/// shard's turn ends.
+/// here or behind a link wants. Thread safety: one writer (the conductor), any number of readers;
+/// reads are wait-free. A reader's pointer is good until its shard's turn ends.
 class GroupTable {
  public:
   GroupTable();
