@@ -6,7 +6,7 @@
 namespace gimnet::net {
 namespace {
 
-constexpr std::string_view kTcp = "tcp://";
+constexpr std::string_view kTcpScheme = "tcp://";
 constexpr std::string_view kUnix = "unix:";
 
 bool is_host(std::string_view text) {
@@ -20,21 +20,21 @@ std::string advice_for(std::string_view url) {
   std::string meant;
   if (url.starts_with('/')) meant = std::string(kUnix) + std::string(url);
   if (url.find('/') == std::string_view::npos && url.find(':') != std::string_view::npos) {
-    meant = std::string(kTcp) + std::string(url);
+    meant = std::string(kTcpScheme) + std::string(url);
   }
   // A slash too few, or too many.
   constexpr std::string_view kScheme = "tcp:/";
   if (url.starts_with(kScheme)) {
     meant =
-        std::string(kTcp) +
+        std::string(kTcpScheme) +
         std::string(url.substr(std::min(url.find_first_not_of('/', kScheme.size()), url.size())));
   }
   if (!meant.empty() && meant != url && parse_address(meant)) return "did you mean " + meant + "?";
   std::string advice = "give tcp://host:port or unix:/path";
-  const std::string_view host = url.starts_with(kTcp) ? url.substr(kTcp.size()) : url;
+  const std::string_view host = url.starts_with(kTcpScheme) ? url.substr(kTcpScheme.size()) : url;
   if (is_host(host)) {
-    advice +=
-        ", such as " + std::string(kTcp) + std::string(host) + ":" + std::to_string(kDefaultPort);
+    advice += ", such as " + std::string(kTcpScheme) + std::string(host) + ":" +
+              std::to_string(kDefaultPort);
   }
   return advice;
 }
@@ -49,7 +49,8 @@ NetError not_understood(std::string_view url, std::string_view why) {
 std::string Address::url() const {
   if (scheme == Scheme::unix_socket) return std::string(kUnix) + path;
   const bool numeric_v6 = host.find(':') != std::string::npos;
-  return std::string(kTcp) + (numeric_v6 ? "[" + host + "]" : host) + ":" + std::to_string(port);
+  return std::string(kTcpScheme) + (numeric_v6 ? "[" + host + "]" : host) + ":" +
+         std::to_string(port);
 }
 
 Result<Address, NetError> parse_address(std::string_view url, std::uint16_t least_port) {
@@ -62,8 +63,8 @@ Result<Address, NetError> parse_address(std::string_view url, std::uint16_t leas
       return not_understood(url, "the path is too long for a Unix socket");
     return address;
   }
-  if (!url.starts_with(kTcp)) return not_understood(url, "the scheme is unknown");
-  const std::string_view rest = url.substr(kTcp.size());
+  if (!url.starts_with(kTcpScheme)) return not_understood(url, "the scheme is unknown");
+  const std::string_view rest = url.substr(kTcpScheme.size());
   const std::size_t colon = rest.rfind(':');
   if (colon == std::string_view::npos) return not_understood(url, "the port is missing");
   std::string_view host = rest.substr(0, colon);

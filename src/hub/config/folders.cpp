@@ -13,14 +13,14 @@
 namespace gimnet::hub {
 namespace {
 
-constexpr mode_t kPrivate = 0700;
+constexpr mode_t kPrivateFolder = 0700;
 
 constexpr const char* kElsewhere = "name another place";
 constexpr const char* kStateElsewhere = "name another place with --state-dir";
 
 /// What can be done about a folder that cannot be made or looked at; `elsewhere` can always be
 /// done.
-std::string remedy_of(int error, const std::string& path, const std::string& elsewhere) {
+std::string remedy_of_folder(int error, const std::string& path, const std::string& elsewhere) {
   const std::size_t slash = path.rfind('/');
   const std::string above = slash == std::string::npos ? "."
                             : slash == 0               ? "/"
@@ -48,17 +48,17 @@ void give_to_user_above(const std::string& path) {
 /// "" when there is something at `path` then; `info` describes it.
 std::string make_folder(const std::string& path, struct stat& info,
                         const char* elsewhere = kElsewhere) {
-  const bool made = ::mkdir(path.c_str(), kPrivate) == 0;
+  const bool made = ::mkdir(path.c_str(), kPrivateFolder) == 0;
   if (!made && errno != EEXIST) {
     const int error = errno;
     return "cannot create the folder " + path + ": " + system_text(error) +
-           remedy_of(error, path, elsewhere);
+           remedy_of_folder(error, path, elsewhere);
   }
   if (made) give_to_user_above(path);
   if (::lstat(path.c_str(), &info) != 0) {
     const int error = errno;
     return "cannot use the folder " + path + ": " + system_text(error) +
-           remedy_of(error, path, elsewhere);
+           remedy_of_folder(error, path, elsewhere);
   }
   return {};
 }

@@ -21,7 +21,7 @@
 namespace gimnet::hub {
 namespace {
 
-constexpr mode_t kPrivate = 0600;
+constexpr mode_t kPrivateFile = 0600;
 constexpr const char* kState = "state";
 constexpr const char* kFresh = "state.new";
 constexpr const char* kLock = "lock";
@@ -159,7 +159,7 @@ int StateFolder::open_lock(int folder, const Owner& owner) {
   constexpr int kHow = O_RDWR | O_NOFOLLOW | O_CLOEXEC;
   for (;;) {
     // Only a file that was created here is given away.
-    Descriptor created(::openat(folder, kLock, kHow | O_CREAT | O_EXCL, kPrivate));
+    Descriptor created(::openat(folder, kLock, kHow | O_CREAT | O_EXCL, kPrivateFile));
     if (created.is_open()) return give(created.get(), owner) ? created.release() : -1;
     if (errno != EEXIST) return -1;
     const int found = ::openat(folder, kLock, kHow);
@@ -207,8 +207,8 @@ std::string StateFolder::write(const HubState& state) {
         errno == EISDIR ? "it is a folder; remove it" : system_text(errno) + kMakeWritable;
     return "cannot write the hub's state: " + path_ + "/" + kFresh + " is in the way: " + why;
   }
-  const Descriptor file(
-      ::openat(folder_, kFresh, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, kPrivate));
+  const Descriptor file(::openat(
+      folder_, kFresh, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, kPrivateFile));
   if (!file.is_open()) return failed("create");
   created = true;
   if (!give(file.get(), owner_)) return failed("chown");

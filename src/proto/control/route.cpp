@@ -49,8 +49,6 @@ UniqueId load_unique_id(const std::byte* bytes) {
   return unique;
 }
 
-bool names_a_hub(HubId hub) { return hub != kOwnHub && hub.value() <= kHubIdMax; }
-
 HubKey read_hub_key(Fields& fields) {
   HubKey key;
   key.hub = HubId{fields.required_number<std::uint16_t>(record_key::hub, "hub id")};

@@ -34,6 +34,11 @@ inline constexpr std::uint16_t kPartsMax = 64;
 /// A part as a whole, with keys that this version does not know: twice what it can have today.
 inline constexpr std::size_t kPartBytesMax = 4096;
 
+/// Is that the id of a hub, and not of none?
+[[nodiscard]] inline bool names_a_hub(HubId hub) {
+  return hub != kOwnHub && hub.value() <= kHubIdMax;
+}
+
 /// A hub at the other end of a link. Of several links to it the cheapest counts.
 struct Neighbour {
   HubKey hub;

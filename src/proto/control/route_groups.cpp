@@ -27,7 +27,7 @@ GroupId read_group(Fields& fields, const std::byte* bytes) {
   const GroupId group{load_le<std::uint32_t>(bytes)};
   const HubId hub = hub_of(group);
   const std::uint32_t index = index_of(group);
-  if (hub == kOwnHub || hub.value() > kHubIdMax || index == 0 || index > kIndexMost)
+  if (!names_a_hub(hub) || index == 0 || index > kIndexMost)
     fields.fail("has a group id that cannot be one");
   return group;
 }

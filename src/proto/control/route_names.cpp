@@ -17,7 +17,7 @@ namespace names_key {
 enum : std::uint32_t { hub = 1, instance, after, version, forgotten, record };
 }  // namespace names_key
 
-namespace record_key {
+namespace name_key {
 enum : std::uint32_t {
   name = 1,
   version,
@@ -34,9 +34,7 @@ enum : std::uint32_t {
   retain,
   proof,  // reserved
 };
-}  // namespace record_key
-
-bool names_a_hub(HubId hub) { return hub != kOwnHub && hub.value() <= kHubIdMax; }
+}  // namespace name_key
 
 template <class Choice>
 Choice read_choice(Fields& fields, std::uint32_t key, const char* name, Choice last) {
@@ -47,7 +45,7 @@ Choice read_choice(Fields& fields, std::uint32_t key, const char* name, Choice l
 }
 
 void write_service(bitestream::Writer& writer, const ServiceClaim& service) {
-  namespace key = record_key;
+  namespace key = name_key;
   writer.put_u32(key::group, service.group.value());
   writer.put_u64(key::session, service.session);
   writer.put_u32(key::message_type, service.message_type);
@@ -59,7 +57,7 @@ void write_service(bitestream::Writer& writer, const ServiceClaim& service) {
 }
 
 ServiceClaim read_service(Fields& fields) {
-  namespace key = record_key;
+  namespace key = name_key;
   ServiceClaim service;
   service.group = GroupId{fields.required_number<std::uint32_t>(key::group, "group id")};
   service.session = fields.number<std::uint64_t>(key::session, "session", 0);
@@ -73,7 +71,7 @@ ServiceClaim read_service(Fields& fields) {
 }
 
 void write_name(bitestream::Writer& writer, const NameRecord& record) {
-  namespace key = record_key;
+  namespace key = name_key;
   const NameClaim& claim = record.claim;
   put_clean_text(writer, key::name, record.name, kNameBytesMax);
   writer.put_u64(key::version, claim.version);
@@ -86,7 +84,7 @@ void write_name(bitestream::Writer& writer, const NameRecord& record) {
 }
 
 NameRecord read_name(Fields& fields) {
-  namespace key = record_key;
+  namespace key = name_key;
   NameRecord record;
   NameClaim& claim = record.claim;
   record.name = fields.required_text(key::name, "name", kNameBytesMax);

@@ -14,6 +14,11 @@ std::uint32_t worth_forgetting(std::uint32_t most) {
 
 }  // namespace
 
+std::chrono::milliseconds index_resting_time(const Limits& limits) {
+  return std::chrono::milliseconds{limits.grace_ms +
+                                   std::max(limits.block_ms, limits.slow_consumer_ms)};
+}
+
 IndexPool::IndexPool(std::uint32_t most, std::chrono::milliseconds resting_time,
                      const IndexRange& range, std::chrono::milliseconds returns_until)
     : most_(most),

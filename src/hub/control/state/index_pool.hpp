@@ -8,8 +8,12 @@
 
 #include "hub/control/state/due_list.hpp"
 #include "hub/control/state/index_set.hpp"
+#include "hub/limits.hpp"
 
 namespace gimnet::hub {
+
+/// How long an index rests: until no frame to its former holder can wait in this hub.
+[[nodiscard]] std::chrono::milliseconds index_resting_time(const Limits& limits);
 
 /// From where a pool hands out indices to newcomers: `count` of them from `first` on, cyclically,
 /// without those that were used before a restart and wait for who comes back.

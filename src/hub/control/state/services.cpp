@@ -14,10 +14,6 @@ using proto::Status;
 using proto::ns::ChangeKind;
 using std::chrono::milliseconds;
 
-milliseconds resting_time(const Limits& limits) {
-  return milliseconds{limits.grace_ms + std::max(limits.block_ms, limits.slow_consumer_ms)};
-}
-
 template <class List>
 auto find_topic(List& list, const Topic& topic) {
   return std::find_if(list.begin(), list.end(),
@@ -63,7 +59,7 @@ std::optional<SubscriberTerms> Topic::pace_of(NodeIndex subscriber) const {
 }
 
 Services::Services(HubId hub, const Limits& limits, const IndexRange& groups)
-    : hub_(hub), limits_(limits), group_indices_(kIndexMost, resting_time(limits), groups) {}
+    : hub_(hub), limits_(limits), group_indices_(kIndexMost, index_resting_time(limits), groups) {}
 
 Result<Services::Advertised, proto::Refusal> Services::advertise(NodeIndex provider,
                                                                  std::string_view full_name,

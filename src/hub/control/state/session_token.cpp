@@ -9,7 +9,7 @@ namespace gimnet::hub {
 namespace {
 
 constexpr unsigned kCountBits = 40;
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kTokenVersion = 1;
 
 // Layout: u32 version, u32 index, u64 session number, i64 expiry in ms since 1970, MAC.
 constexpr std::size_t kIndexAt = 4;
@@ -36,7 +36,7 @@ SessionNumber first_number(std::uint64_t boot) {
 std::vector<std::byte> write_token(const SessionToken& token, const TokenHolder& holder,
                                    const Secret& secret) {
   std::vector<std::byte> bytes(kMacAt);
-  store_le(bytes.data(), kVersion);
+  store_le(bytes.data(), kTokenVersion);
   store_le(bytes.data() + kIndexAt, token.index.value());
   store_le(bytes.data() + kNumberAt, token.number);
   store_le(bytes.data() + kExpiryAt, static_cast<std::uint64_t>(token.expiry.count()));
@@ -46,7 +46,7 @@ std::vector<std::byte> write_token(const SessionToken& token, const TokenHolder&
 }
 
 std::optional<SessionToken> read_token(std::span<const std::byte> bytes) {
-  if (bytes.size() != kSessionTokenBytes || load_le<std::uint32_t>(bytes.data()) != kVersion)
+  if (bytes.size() != kSessionTokenBytes || load_le<std::uint32_t>(bytes.data()) != kTokenVersion)
     return std::nullopt;
   SessionToken token;
   token.index = NodeIndex{load_le<std::uint32_t>(bytes.data() + kIndexAt)};

@@ -13,10 +13,6 @@ using std::chrono::milliseconds;
 
 /// An id that was given back rests for as long as its node might come back and a frame for it might
 /// still wait.
-milliseconds resting_time(const Limits& limits) {
-  return milliseconds{limits.grace_ms + std::max(limits.block_ms, limits.slow_consumer_ms)};
-}
-
 }  // namespace
 
 std::string title(NodeId node, const Session& session) {
@@ -31,7 +27,7 @@ Sessions::Sessions(const Options& options, const Limits& limits)
       secret_(options.secret),
       returns_until_(options.returns_until),
       last_number_(first_number(options.boot)),
-      indices_(kIndexMost, resting_time(limits), options.nodes,
+      indices_(kIndexMost, index_resting_time(limits), options.nodes,
                options.returns_until.value_or(milliseconds{0})),
       kicked_(options.kicked),
       slots_(options.shards) {

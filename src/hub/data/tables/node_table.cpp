@@ -10,20 +10,20 @@ namespace gimnet::hub {
 namespace {
 constexpr std::size_t kWords = std::size_t{1} << kIndexBits;
 constexpr std::size_t kExpectedWords = kWords / 64;
-constexpr std::size_t kBytes = (kWords + kExpectedWords) * sizeof(std::atomic<std::uint64_t>);
+constexpr std::size_t kTableBytes = (kWords + kExpectedWords) * sizeof(std::atomic<std::uint64_t>);
 static_assert(std::atomic<std::uint64_t>::is_always_lock_free);
 }  // namespace
 
 NodeTable::NodeTable() {
   // Anonymous memory is zero, which is the empty entry, and costs nothing until an index is used.
-  void* memory = ::mmap(nullptr, kBytes, PROT_READ | PROT_WRITE,
+  void* memory = ::mmap(nullptr, kTableBytes, PROT_READ | PROT_WRITE,
                         MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
   if (memory == MAP_FAILED) throw std::bad_alloc{};
   words_ = static_cast<std::atomic<std::uint64_t>*>(memory);
   expected_ = words_ + kWords;
 }
 
-NodeTable::~NodeTable() { ::munmap(static_cast<void*>(words_), kBytes); }
+NodeTable::~NodeTable() { ::munmap(static_cast<void*>(words_), kTableBytes); }
 
 void NodeTable::publish(std::uint32_t index, NodePlace place) {
   GIMNET_CHECK(index < kWords && place.slot.value() < kSlotsMax &&
