@@ -13,6 +13,7 @@ if(NOT _status EQUAL 0)
   message(FATAL_ERROR "${_table} cannot be read: see above")
 endif()
 add_custom_target(all_planted)
+get_property(_libraries GLOBAL PROPERTY GIMNET_LIBRARIES)
 
 # gimnet_planted_bug(NAME TARGET PROGRAM QUICK FILES COMPILES), as a line of `planted.py list` has them.
 function(gimnet_planted_bug name target program quick files compiles)
@@ -26,6 +27,9 @@ function(gimnet_planted_bug name target program quick files compiles)
   add_custom_command(OUTPUT ${_changed}
     COMMAND ${Python3_EXECUTABLE} ${_planted} write ${name} ${_folder}
     DEPENDS ${files} ${_table} ${_planted} VERBATIM)
+  # A program can hide an object of a library only as a whole.
+  set_source_files_properties(${files} ${compiles} TARGET_DIRECTORY ${_libraries}
+    PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
   get_target_property(_sources ${program} SOURCES)
   get_target_property(_source_dir ${program} SOURCE_DIR)
   if(NOT _sources)

@@ -4,6 +4,7 @@
 function(gimnet_library name)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS" ${ARGN})
   add_library(${name} STATIC ${ARG_SOURCES})
+  set_property(GLOBAL APPEND PROPERTY GIMNET_LIBRARIES ${name})
   target_link_libraries(${name} PUBLIC gimnet_options ${ARG_DEPENDS})
 endfunction()
 
