@@ -7,7 +7,6 @@
 #include <utility>
 #include <vector>
 
-#include "base/endian.hpp"
 #include "client/gimi/loss_tally.hpp"
 #include "client/gimi/message.hpp"
 #include "proto/control/control_message.hpp"
@@ -214,18 +213,18 @@ nif_verdict Reception::refuse(const nif_incoming& in, const proto::gimi::Message
 
 nif_verdict Reception::on_request(const nif_incoming& in, const proto::gimi::MessageView& view) {
   using proto::gimi::RequestFault;
-  if (!is_for_one(in) || in.from == 0 || view.data.size() < proto::gimi::kRequestPrefix) {
+  const auto body = proto::gimi::decode_request(view.data);
+  if (!is_for_one(in) || in.from == 0 || !body) {
     losses_.add_unreadable();
     return NIF_DONE;
   }
   proto::gimi::MessageView request = view;
-  request.data = view.data.subspan(proto::gimi::kRequestPrefix);
+  request.data = body->data;
   Message message = make_message(in, request, nullptr, reconnects_);
   const auto queue = answers_.find(message.key());
   const bool too_large = request.data.size() > message_bytes_max_;
   if (queue != nullptr && !too_large) {
-    const auto left_ms = load_le<std::uint32_t>(view.data.data());
-    if (queue->on_request(view.header, message, left_ms)) return NIF_KEEP;
+    if (queue->on_request(view.header, message, body->left_ms)) return NIF_KEEP;
   } else {
     const RequestFault fault = too_large ? RequestFault::too_large : RequestFault::nobody;
     const Envelope envelope{

@@ -11,6 +11,11 @@ constexpr std::size_t kFixed = 6;
 
 }  // namespace
 
+std::optional<RequestBody> decode_request(std::span<const std::byte> data) {
+  if (data.size() < kRequestPrefix) return std::nullopt;
+  return RequestBody{load_le<std::uint32_t>(data.data()), data.subspan(kRequestPrefix)};
+}
+
 std::optional<RequestError> decode_request_error(std::span<const std::byte> data) {
   if (data.size() < kFixed) return std::nullopt;
   const auto words = data.subspan(kFixed);

@@ -25,6 +25,14 @@ inline constexpr std::uint8_t kFlagRepeat = 0x08;
 inline constexpr std::size_t kRequestPrefix = 4;
 inline constexpr std::uint32_t kNoDeadline = UINT32_MAX;
 
+/// The data of a REQUEST. Valid until: its bytes change.
+struct RequestBody {
+  std::uint32_t left_ms = kNoDeadline;
+  std::span<const std::byte> data;  ///< the application's
+};
+/// Nothing: too short.
+[[nodiscard]] std::optional<RequestBody> decode_request(std::span<const std::byte> data);
+
 /// Why a request has no reply.
 enum class RequestFault : std::uint16_t {
   failed = 0x100,     ///< the program says so, with its own code
