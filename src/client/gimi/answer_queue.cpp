@@ -94,8 +94,11 @@ void AnswerQueue::keep(Answer answer) {
 }
 
 void AnswerQueue::remember(std::uint64_t name) {
+  if (!came_.insert(name).second) return;
   names_.push_back(name);
-  if (names_.size() > kNamesMax) names_.pop_front();
+  if (names_.size() <= kNamesMax) return;
+  came_.erase(names_.front());
+  names_.pop_front();
 }
 
 bool AnswerQueue::on_request(const proto::gimi::MessageHeader& header, Message& message,
@@ -108,7 +111,8 @@ bool AnswerQueue::on_request(const proto::gimi::MessageHeader& header, Message& 
     refuse(way, name, RequestFault::withdrawn);
     return false;
   }
-  if (again) {
+  const bool known = came_.contains(name);
+  if (known) {
     if (const auto open = open_.find(name); open != open_.end()) {
       open->second = way;  // the asking node may have another id now
       return false;
@@ -118,12 +122,12 @@ bool AnswerQueue::on_request(const proto::gimi::MessageHeader& header, Message& 
       static_cast<void>(send(way, name, kept->operation, kept->data, 0));
       return false;
     }
-    const bool may_have_come =
-        names_.size() == kNamesMax || std::ranges::find(names_, name) != names_.end();
-    if (may_have_come && !header.has(proto::gimi::kFlagRepeat)) {
-      refuse(way, name, RequestFault::unknown);
-      return false;
-    }
+  }
+  // Also the first of two that came behind the second.
+  const bool may_have_come = known || (again && names_.size() == kNamesMax);
+  if (may_have_come && !header.has(proto::gimi::kFlagRepeat)) {
+    if (again) refuse(way, name, RequestFault::unknown);
+    return false;
   }
   if (waiting_.size() >= kWaitingMax) {
     refuse(way, name, RequestFault::busy);
@@ -154,8 +158,8 @@ AnswerTable::Added AnswerTable::add(const std::string& full_name) {
   auto queue = std::make_shared<AnswerQueue>(uplink_, full_name);
   const MutexLock lock(mutex_);
   if (end_) queue->end(end_);
-  const MessageKey key{proto::gimi::kRequestType, next_++};
-  queues_.emplace(key.instance, queue);
+  MessageKey key{proto::gimi::kRequestType, Uplink::draw_epoch()};
+  while (!queues_.emplace(key.instance, queue).second) ++key.instance;
   return {queue, key};
 }
 

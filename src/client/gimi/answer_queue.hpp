@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <unordered_set>
 #include <vector>
 
 #include "base/mutex.hpp"
@@ -88,16 +89,18 @@ class AnswerQueue {
 
   Mutex mutex_;
   Condition filled_;
-  std::deque<Waiting> waiting_ GIMNET_GUARDED_BY(mutex_);        ///< Limit: kWaitingMax
-  std::map<std::uint64_t, Way> open_ GIMNET_GUARDED_BY(mutex_);  ///< not answered
-  std::deque<std::uint64_t> names_ GIMNET_GUARDED_BY(mutex_);    ///< Limit: kNamesMax
-  std::deque<Answer> answers_ GIMNET_GUARDED_BY(mutex_);         ///< Limit: kAnswersMax
+  std::deque<Waiting> waiting_ GIMNET_GUARDED_BY(mutex_);             ///< Limit: kWaitingMax
+  std::map<std::uint64_t, Way> open_ GIMNET_GUARDED_BY(mutex_);       ///< not answered
+  std::deque<std::uint64_t> names_ GIMNET_GUARDED_BY(mutex_);         ///< Limit: kNamesMax
+  std::unordered_set<std::uint64_t> came_ GIMNET_GUARDED_BY(mutex_);  ///< the same
+  std::deque<Answer> answers_ GIMNET_GUARDED_BY(mutex_);              ///< Limit: kAnswersMax
   std::size_t answer_bytes_ GIMNET_GUARDED_BY(mutex_) = 0;
   Ending end_ GIMNET_GUARDED_BY(mutex_);
 };
 
-/// The services of a node that answer, by the instance of their key. Thread safety: any thread.
-/// Limits: those of the hub.
+/// The services of a node that answer, by the instance of their key. That is drawn at random: a
+/// request that is asked again never reaches a program that was started since. Thread safety: any
+/// thread. Limits: those of the hub.
 class AnswerTable {
  public:
   explicit AnswerTable(Uplink& uplink) : uplink_(uplink) {}
@@ -116,7 +119,6 @@ class AnswerTable {
   Uplink& uplink_;
   Mutex mutex_;
   std::map<std::uint32_t, std::shared_ptr<AnswerQueue>> queues_ GIMNET_GUARDED_BY(mutex_);
-  std::uint32_t next_ GIMNET_GUARDED_BY(mutex_) = 1;
   Ending end_ GIMNET_GUARDED_BY(mutex_);
 };
 

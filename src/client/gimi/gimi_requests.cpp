@@ -48,36 +48,29 @@ struct RequestStorage {
   TakenRequest taken;
 };
 
-/// Its connection broke, and it may come back.
-bool is_away(Core& core, const std::string& service, std::int64_t deadline_ns) {
-  const std::string node = service.substr(0, service.rfind('/'));
-  const auto found = list_nodes(core.node(), node, Timeout{nif_timeout_until(deadline_ns)});
-  const auto is_node = [&node](const NodeRecord& record) { return record.name == node; };
-  if (!found) return false;
-  const auto record = std::ranges::find_if(*found, is_node);
-  return record != found->end() && !record->connected;
-}
-
-/// Finds who answers a service. While its node is away it waits for it.
+/// Finds who answers a service. Nobody: it waits for a moment where the hub cannot be sure of that.
 Outcome<void> reach(Core& core, const std::string& service, std::int64_t deadline_ns) {
-  while (!core.requests().knows(service)) {
+  OpenRequests& requests = core.requests();
+  const std::int64_t give_up_ns =
+      std::min(deadline_ns, steady_now_ns() + OpenRequests::kRetryForNs);
+  const auto left = [deadline_ns] { return Timeout{nif_timeout_until(deadline_ns)}; };
+  while (!requests.knows(service)) {
     bool answers = true;
     const auto learn = [&](const StreamTable::Stream& stream, const ServicePlace& place) {
       answers = place.destination() == 0 || place.key.type == proto::gimi::kRequestType;
-      if (answers) core.requests().learn(service, stream, place);
+      if (answers) requests.learn(service, stream, place);
     };
-    const auto stream =
-        stream_to_service(core, service, {}, Timeout{nif_timeout_until(deadline_ns)}, learn);
-    if (stream && answers) return {};
-    if (stream) {
+    const auto stream = stream_to_service(core, service, {}, left(), learn);
+    if (stream && !answers) {
       return Failure{Status::not_found,
                      "cannot ask " + service + ": it takes commands and answers nothing"};
     }
-    if (!stream.is(Status::not_found) || is_over(deadline_ns) ||
-        !is_away(core, service, deadline_ns)) {
-      return stream.failure();
-    }
-    core.requests().pause(std::min(deadline_ns, steady_now_ns() + OpenRequests::kRetryNs));
+    if (!stream && !stream.is(Status::not_found)) return stream.failure();
+    const std::string node = service.substr(0, service.rfind('/'));
+    if (is_over(give_up_ns) || (!stream && !may_come(core.node(), node, left())))
+      return Failure{Status::not_found, "cannot ask " + service + ": nobody answers there"};
+    requests.wait_for_place(service,
+                            std::min(give_up_ns, steady_now_ns() + OpenRequests::kRetryNs));
   }
   return {};
 }

@@ -8,6 +8,7 @@
 #include "client/gimi/uplink.hpp"
 #include "client/nif/answer_status.hpp"
 #include "proto/control/ctrl_network.hpp"
+#include "proto/control/ns.hpp"
 
 namespace gimnet::gimi {
 namespace {
@@ -101,6 +102,21 @@ Outcome<std::vector<ServiceRecord>> list_services(nif_node* node, const std::str
   for (const nif_service_record& found : std::span(list->records, list->count))
     records.push_back(record_of(found));
   return records;
+}
+
+bool may_come(nif_node* node, const std::string& name, Timeout timeout) {
+  const auto body = body_of(proto::ns::Resolve{name});
+  nif_reply* reply = nullptr;
+  const nif_status status =
+      nif_request(node, NIF_NS, proto::ns::Resolve::kOperation, body.bytes().data(), body.size(),
+                  &reply, nif_timeout(timeout));
+  if (status != NIF_OK) return true;
+  const std::unique_ptr<nif_reply, void (*)(nif_reply*)> owner(reply, &nif_free_reply);
+  const std::span content(static_cast<const std::byte*>(reply->content), reply->size);
+  if (reply->status != 0) return proto::read_status(content).learning;
+  proto::Fields fields(content, proto::ns::ResolveAnswer::kName);
+  const auto answer = proto::ns::ResolveAnswer::read(fields);
+  return fields.failed() || answer.learning || answer.standing != proto::ns::NameStanding::held;
 }
 
 Outcome<HubRecord> ask_hub(Asking who, Timeout timeout) {

@@ -22,6 +22,10 @@ namespace gimnet::gimi {
                                                                 const std::string& pattern,
                                                                 Timeout timeout);
 
+/// A node of that name may be there soon, if it is not: its connection broke, its hub cannot be
+/// reached, or names of other hubs may be on their way. Also where the hub did not say.
+[[nodiscard]] bool may_come(nif_node* node, const std::string& name, Timeout timeout);
+
 /// Who asks, and which hub; 0: the own one.
 struct Asking {
   nif_node* node = nullptr;

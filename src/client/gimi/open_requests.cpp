@@ -16,20 +16,22 @@ Ended without_reply(Status status, Ran ran, std::string sentence) {
   return {status, std::move(sentence), ran, 0, {}};
 }
 
-Ended reply_of(const proto::gimi::RequestError& error, const std::string& service) {
+/// `unsure`: it was sent before, and may have been done by that.
+Ended reply_of(const proto::gimi::RequestError& error, const std::string& service, bool unsure) {
   const std::string words = service + ": ";
+  const Ran not_done = unsure ? Ran::maybe : Ran::no;
   switch (error.fault) {
     case RequestFault::failed:
       return {Status::failed, words + std::string(error.sentence), Ran::yes, error.code, {}};
     case RequestFault::busy:
-      return without_reply(Status::busy, Ran::no, words + "too many requests wait there");
+      return without_reply(Status::busy, not_done, words + "too many requests wait there");
     case RequestFault::late:
-      return without_reply(Status::timeout, Ran::no, words + "the request came too late");
+      return without_reply(Status::timeout, not_done, words + "the request came too late");
     case RequestFault::nobody:
     case RequestFault::withdrawn:
-      return without_reply(Status::not_found, Ran::no, words + "nobody answers there any more");
+      return without_reply(Status::not_found, not_done, words + "nobody answers there any more");
     case RequestFault::too_large:
-      return without_reply(Status::too_large, Ran::no,
+      return without_reply(Status::too_large, not_done,
                            words + "the request is larger than it takes");
     case RequestFault::let_go:
       return without_reply(Status::gone, Ran::maybe,
@@ -56,12 +58,22 @@ bool may_come_back(std::uint32_t reason) {
 
 }  // namespace
 
+bool OpenRequests::knows_locked(const std::string& service) const {
+  const auto found = services_.find(service);
+  return found != services_.end() && found->second.place.destination() != 0;
+}
+
 bool OpenRequests::knows(const std::string& service) {
   const MutexLock lock(mutex_);
-  const auto found = services_.find(service);
-  if (found == services_.end() || found->second.place.destination() == 0) return false;
-  found->second.asked = ++asked_;
+  if (!knows_locked(service)) return false;
+  services_.find(service)->second.asked = ++asked_;
   return true;
+}
+
+void OpenRequests::wait_for_place(const std::string& service, std::int64_t until_ns) {
+  const MutexLock lock(mutex_);
+  while (!end_ && !knows_locked(service) && !is_over(until_ns))
+    static_cast<void>(ended_.wait_until(mutex_, until_ns));
 }
 
 void OpenRequests::learn(const std::string& service, StreamTable::Stream stream,
@@ -92,10 +104,9 @@ Outcome<std::uint32_t> OpenRequests::open(const std::string& service, BytesView 
     std::ranges::copy(data.span(), made.message.begin() + proto::gimi::kRequestPrefix);
     made.lane = options.lane;
     made.repeat = options.repeat;
-    made.begun_ns = steady_now_ns();
     made.deadline_ns = deadline_ns;
-    sending = prepare(number, made, made.begun_ns);
-    if (!sending) made.again_ns = made.begun_ns + kRetryNs;
+    sending = prepare(number, made, steady_now_ns());
+    if (!sending) made.again_ns = steady_now_ns() + kRetryNs;
   }
   if (sending) {
     transmit(number, *sending, nif_timeout_until(deadline_ns));
@@ -117,12 +128,12 @@ std::optional<OpenRequests::Sending> OpenRequests::prepare(std::uint32_t number,
         std::min<std::int64_t>(left, proto::gimi::kNoDeadline - std::int64_t{1}));
   }
   store_le(open.message.data(), left_ms);
-  std::uint8_t flags = open.may_have_run ? proto::gimi::kFlagAgain : 0;
+  open.unsure |= std::exchange(open.sent, true);  // from the moment at which it is given away
+  std::uint8_t flags = open.unsure ? proto::gimi::kFlagAgain : 0;
   if (open.repeat) flags |= proto::gimi::kFlagRepeat;
   open.provider = place.provider;
   open.session = place.session;
   open.again_ns = 0;
-  open.may_have_run = true;  // from the moment at which it is given away
   return Sending{
       {place.group, NIF_SERVICE, NIF_POLICY_DEFAULT, open.lane, place.key, 0, NIF_FLAG_REPORT},
       {number, proto::gimi::Operation::request, flags, 0, epoch_},
@@ -134,20 +145,18 @@ void OpenRequests::transmit(std::uint32_t number, const Sending& sending, std::i
       uplink_.transmit(sending.envelope, sending.header, false, sending.message, timeout_ms);
   if (status == NIF_OK) return;
   Failure failure = failure_of(status, "send a request");
-  const bool again = sending.header.has(proto::gimi::kFlagAgain);
   {
     const MutexLock lock(mutex_);
     const auto found = open_.find(number);
     if (found == open_.end() || found->second.reply) return;
     Open& open = found->second;
-    open.may_have_run = again;
-    if (status == NIF_TIMEOUT && !is_over(open.deadline_ns)) {
-      open.again_ns = steady_now_ns() + kRetryNs;  // the hub has paused the way
-    } else {
-      finish(open, without_reply(failure.status, again ? Ran::maybe : Ran::no,
-                                 std::move(failure.sentence)));
-      return;
+    open.sent = false;
+    // One that may have come is named again when the connection is back.
+    if (status == NIF_NOT_CONNECTED && open.unsure) return;
+    if (status != NIF_TIMEOUT || is_over(open.deadline_ns)) {
+      return finish(open, without_reply(failure.status, open.ran(), std::move(failure.sentence)));
     }
+    open.again_ns = steady_now_ns() + kRetryNs;  // the hub has paused the way
   }
   attend_();
 }
@@ -158,10 +167,15 @@ void OpenRequests::finish(Open& open, Ended reply) {
   ended_.notify_all();
 }
 
-void OpenRequests::retry(Open& open, Ended otherwise, std::int64_t until_ns) {
+void OpenRequests::time_out(Open& open) {
+  finish(open, without_reply(Status::timeout, open.ran(),
+                             open.service + " did not answer within the time given"));
+}
+
+void OpenRequests::retry(Open& open, Ended otherwise) {
   const std::int64_t now = steady_now_ns();
-  if (now >= until_ns) return finish(open, std::move(otherwise));
-  open.may_have_run = false;
+  if (open.give_up_ns == 0) open.give_up_ns = now + kRetryForNs;
+  if (now >= std::min(open.give_up_ns, open.deadline_ns)) return finish(open, std::move(otherwise));
   open.again_ns = now + kRetryNs;
 }
 
@@ -172,10 +186,7 @@ std::optional<Ended> OpenRequests::wait(std::uint32_t number, std::int64_t until
     const auto found = open_.find(number);
     if (found == open_.end()) return without_reply(Status::closed, Ran::maybe, "it has ended");
     Open& open = found->second;
-    if (!open.reply && is_over(open.deadline_ns)) {
-      open.reply = without_reply(Status::timeout, open.may_have_run ? Ran::maybe : Ran::no,
-                                 open.service + " did not answer within the time given");
-    }
+    if (!open.reply && is_over(open.deadline_ns)) time_out(open);
     if (open.reply) {
       std::optional<Ended> reply = std::move(open.reply);
       open_.erase(found);
@@ -189,11 +200,6 @@ std::optional<Ended> OpenRequests::wait(std::uint32_t number, std::int64_t until
 void OpenRequests::cancel(std::uint32_t number) {
   const MutexLock lock(mutex_);
   open_.erase(number);
-}
-
-void OpenRequests::pause(std::int64_t until_ns) {
-  const MutexLock lock(mutex_);
-  static_cast<void>(ended_.wait_until(mutex_, until_ns));
 }
 
 void OpenRequests::leave(std::atomic<bool>& left) {
@@ -228,7 +234,7 @@ void OpenRequests::on_error(const proto::gimi::MessageHeader& header, Peer from,
                             const proto::gimi::RequestError& error) {
   const MutexLock lock(mutex_);
   Open* const open = find(header, from);
-  if (open != nullptr) finish(*open, reply_of(error, open->service));
+  if (open != nullptr) finish(*open, reply_of(error, open->service, open->unsure));
 }
 
 void OpenRequests::on_report(std::uint32_t sequence, std::uint32_t reason,
@@ -238,37 +244,47 @@ void OpenRequests::on_report(std::uint32_t sequence, std::uint32_t reason,
     const auto found = open_.find(sequence);
     if (found == open_.end() || found->second.reply) return;
     Open& open = found->second;
-    const bool unsure = reason == NIF_DROP_LINK_UNSURE;
-    Ended otherwise = without_reply(Status::not_delivered, unsure ? Ran::maybe : Ran::no,
-                                    open.service + ": " + words);
+    open.sent = false;
+    open.unsure |= reason == NIF_DROP_LINK_UNSURE;
+    Ended otherwise = without_reply(Status::not_delivered, open.ran(), open.service + ": " + words);
     if (!may_come_back(reason)) return finish(open, std::move(otherwise));
-    const bool away = reason == NIF_DROP_AWAY;
-    retry(open, std::move(otherwise), away ? open.deadline_ns : open.begun_ns + kRetryForNs);
+    // It waits as long as it may for a node that is only away.
+    if (reason == NIF_DROP_AWAY) open.give_up_ns = INT64_MAX;
+    retry(open, std::move(otherwise));
+    if (reason == NIF_DROP_AWAY) open.give_up_ns = 0;
   }
   attend_();
 }
 
 void OpenRequests::on_service_moved(const std::string& service, const ServicePlace& place) {
-  const MutexLock lock(mutex_);
-  const auto known = services_.find(service);
-  if (known == services_.end()) return;
-  known->second.place = place;
-  for (auto& [number, open] : open_) {
-    if (open.service != service || open.reply || !open.may_have_run) continue;
-    if (place.destination() != 0 && place.provider == open.provider &&
-        place.session == open.session) {
-      continue;
+  {
+    const MutexLock lock(mutex_);
+    const auto known = services_.find(service);
+    if (known == services_.end()) return;
+    known->second.place = place;
+    const bool is_there = place.destination() != 0;
+    for (auto& [number, open] : open_) {
+      if (open.service != service || open.reply) continue;
+      const bool same = place.provider == open.provider && place.session == open.session;
+      if (open.may_have_come() && !(is_there && same)) {
+        finish(open, without_reply(Status::gone, Ran::maybe,
+                                   service + ": the program that was asked has gone"));
+      } else if (is_there && open.again_ns != 0) {
+        open.again_ns = steady_now_ns();
+      }
     }
-    finish(open, without_reply(Status::gone, Ran::maybe,
-                               service + ": the program that was asked has gone"));
+    ended_.notify_all();  // wait_for_place()
   }
+  attend_();
 }
 
 void OpenRequests::on_broken() {
   {
     const MutexLock lock(mutex_);
     for (auto& [number, open] : open_) {
-      if (!open.reply && open.again_ns == 0) open.again_ns = steady_now_ns() + kRetryNs;
+      if (open.reply) continue;
+      open.give_up_ns = 0;
+      if (open.again_ns == 0) open.again_ns = steady_now_ns() + kRetryNs;
     }
     if (open_.empty()) return;
   }
@@ -281,8 +297,7 @@ void OpenRequests::end(const Ending& ending) {
   for (auto& [number, open] : open_) {
     if (open.reply) continue;
     const Failure failure = ending.failure("ask " + open.service);
-    finish(open, without_reply(failure.status, open.may_have_run ? Ran::maybe : Ran::no,
-                               failure.sentence));
+    finish(open, without_reply(failure.status, open.ran(), failure.sentence));
   }
   services_.clear();
   ended_.notify_all();
@@ -296,13 +311,13 @@ bool OpenRequests::tick(std::int64_t now_ns) {
     for (auto& [number, open] : open_) {
       if (open.again_ns == 0) continue;
       more = true;
-      if (open.again_ns > now_ns) continue;
+      if (now_ns >= open.deadline_ns) time_out(open);
+      if (open.again_ns > now_ns || open.reply) continue;
       if (auto sending = prepare(number, open, now_ns)) {
         due.emplace_back(number, std::move(*sending));
-      } else if (!open.may_have_run && now_ns - open.begun_ns >= kRetryForNs) {
-        finish(open, without_reply(Status::not_found, Ran::no, open.service + ": nobody answers"));
       } else {
-        open.again_ns = now_ns + kRetryNs;
+        retry(open,
+              without_reply(Status::not_found, open.ran(), open.service + ": nobody answers"));
       }
     }
   }

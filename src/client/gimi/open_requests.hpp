@@ -51,6 +51,8 @@ class OpenRequests {
 
   /// Is the place of the service known, and does somebody answer there?
   [[nodiscard]] bool knows(const std::string& service) GIMNET_EXCLUDES(mutex_);
+  /// Waits until then, or until that is so, or nothing can come any more.
+  void wait_for_place(const std::string& service, std::int64_t until_ns) GIMNET_EXCLUDES(mutex_);
   /// The service is at `place`; what changes comes to on_service_moved() while `stream` lives.
   void learn(const std::string& service, StreamTable::Stream stream, const ServicePlace& place)
       GIMNET_EXCLUDES(mutex_);
@@ -65,8 +67,6 @@ class OpenRequests {
       GIMNET_EXCLUDES(mutex_);
   /// Nobody waits for it any more.
   void cancel(std::uint32_t number) GIMNET_EXCLUDES(mutex_);
-  /// Waits until then, or until a request ends.
-  void pause(std::int64_t until_ns) GIMNET_EXCLUDES(mutex_);
   /// Sets `left` and has those that wait with it leave.
   void leave(std::atomic<bool>& left) GIMNET_EXCLUDES(mutex_);
 
@@ -99,13 +99,18 @@ class OpenRequests {
     std::vector<std::byte> message;  ///< with room for the time that is left
     Lane lane = Lane::normal;
     bool repeat = false;
-    std::int64_t begun_ns = 0;
     std::int64_t deadline_ns = 0;
-    std::int64_t again_ns = 0;   ///< not 0: it is to be sent then
-    std::uint32_t provider = 0;  ///< to whom it was sent last; 0: nobody yet
-    std::uint64_t session = 0;   ///< of the provider
-    bool may_have_run = false;   ///< it was sent, and not reported
+    std::int64_t again_ns = 0;    ///< not 0: it is to be sent then
+    std::int64_t give_up_ns = 0;  ///< until then it is sent again; 0: it has found its way so far
+    std::uint32_t provider = 0;   ///< to whom it was sent last; 0: nobody yet
+    std::uint64_t session = 0;    ///< of the provider
+    bool sent = false;            ///< the last time, and nobody said that it did not arrive
+    bool unsure = false;          ///< it was sent before that, and nobody knows what became of it
     std::optional<Ended> reply;
+
+    [[nodiscard]] bool may_have_come() const { return sent || unsure; }
+    /// Of an end without an answer.
+    [[nodiscard]] Ran ran() const { return may_have_come() ? Ran::maybe : Ran::no; }
   };
   struct Sending {
     Envelope envelope;
@@ -117,8 +122,10 @@ class OpenRequests {
   void transmit(std::uint32_t number, const Sending& sending, std::int32_t timeout_ms)
       GIMNET_EXCLUDES(mutex_);
   void finish(Open& open, Ended reply) GIMNET_REQUIRES(mutex_);
-  /// It did not arrive: sends it again soon, or ends it.
-  void retry(Open& open, Ended otherwise, std::int64_t until_ns) GIMNET_REQUIRES(mutex_);
+  void time_out(Open& open) GIMNET_REQUIRES(mutex_);
+  /// It found no way: sends it again soon, or ends it if that went on for too long.
+  void retry(Open& open, Ended otherwise) GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] bool knows_locked(const std::string& service) const GIMNET_REQUIRES(mutex_);
   [[nodiscard]] Open* find(const proto::gimi::MessageHeader& header, Peer from)
       GIMNET_REQUIRES(mutex_);
 

@@ -90,10 +90,13 @@ void Declarations::finish_service(const std::string& service, GroupId group) {
   if (found->second.group == group && !found->second.asked) services_.erase(found);
 }
 
-void Declarations::add_subscription(const proto::ns::Subscribe& subscription, GroupId group) {
+void Declarations::add_subscription(const proto::ns::Subscribe& subscription,
+                                    const proto::ns::ServiceState& state) {
   const MutexLock lock(mutex_);
   beginning_.erase(subscription.name);
-  subscriptions_.insert_or_assign(subscription.name, Subscription{subscription, group, group});
+  subscriptions_.insert_or_assign(
+      subscription.name,
+      Subscription{subscription, state.group, state.group, state.provider, state.session});
 }
 
 std::optional<Declarations::Former> Declarations::begin_subscription(
@@ -148,6 +151,8 @@ bool Declarations::on_service_moved(const proto::ns::ServiceMoved& event) {
     return true;
   }
   const GroupId former = std::exchange(found->second.group, event.group);
+  found->second.provider = event.provider;
+  found->second.session = event.session;
   if (former != event.group && !is_subscribed(former)) credits_.forget(former);
   credits_.open(event.group, event.window, found->second.request.number);
   return !found->second.ended;
@@ -349,6 +354,8 @@ bool Declarations::is_subscribed(GroupId group) const {
 void Declarations::on_subscribed(const std::string& full_name, const proto::Payload& payload) {
   const auto answer = proto::decode_answer<proto::ns::SubscribeAnswer>(payload);
   const GroupId group = answer ? answer->group : GroupId{};
+  const NodeId provider = answer ? answer->provider : NodeId{};
+  const std::uint64_t session = answer ? answer->session : 0;
   GroupId former;
   bool changed = false;
   {
@@ -356,11 +363,15 @@ void Declarations::on_subscribed(const std::string& full_name, const proto::Payl
     const auto found = subscriptions_.find(full_name);
     if (found != subscriptions_.end()) {
       former = std::exchange(found->second.group, group);
+      // A hub that began anew may give another program the same group.
+      changed = std::exchange(found->second.provider, provider) != provider;
+      changed |= std::exchange(found->second.session, session) != session;
       const bool ended = found->second.ended;
       const bool was_refused = std::exchange(found->second.refused, !answer);
       // Also that the hub takes it again while nobody provides it: a program that was told of the
       // refusal has to know.
-      changed = (former != group || was_refused == answer.has_value()) && !ended;
+      changed |= former != group || was_refused == answer.has_value();
+      changed = changed && !ended;
       // Requests of the program in between may never have left.
       if (ended) subscriptions_due_.push_back(full_name);
       // Its SERVICE_MOVED was lost with the connection. A hub that began anew may have given it to

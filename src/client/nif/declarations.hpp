@@ -37,8 +37,8 @@ class Declarations {
       GIMNET_EXCLUDES(mutex_);
   /// The hub does not have the group (any more) that end_service() named.
   void finish_service(const std::string& service, GroupId group) GIMNET_EXCLUDES(mutex_);
-  void add_subscription(const proto::ns::Subscribe& subscription, GroupId group)
-      GIMNET_EXCLUDES(mutex_);
+  void add_subscription(const proto::ns::Subscribe& subscription,
+                        const proto::ns::ServiceState& state) GIMNET_EXCLUDES(mutex_);
   /// The former state of a subscription that the program begins or changes.
   struct Former {
     proto::ns::Subscribe request;
@@ -95,9 +95,11 @@ class Declarations {
   struct Subscription {
     proto::ns::Subscribe request;
     GroupId group;
-    GroupId former;        ///< when it was declared last
-    bool ended = false;    ///< for the program, and the hub may still have it
-    bool refused = false;  ///< by the hub, when it was declared last
+    GroupId former;  ///< when it was declared last
+    NodeId provider;
+    std::uint64_t session = 0;  ///< of the provider
+    bool ended = false;         ///< for the program, and the hub may still have it
+    bool refused = false;       ///< by the hub, when it was declared last
   };
   void on_advertised(const std::string& service, const proto::Payload& payload)
       GIMNET_EXCLUDES(mutex_);

@@ -272,7 +272,7 @@ nif_status nif_subscribe_paced(nif_node* node, const char* full_name, const nif_
       // An answer that was lost with its connection began counts that this end does not know.
       if (std::exchange(again, true)) found.declarations().count_anew(request);
       const nif_status asked = ask(found, request, answer, "subscribe to", full_name, deadline);
-      if (asked == NIF_OK) found.declarations().add_subscription(request, answer.group);
+      if (asked == NIF_OK) found.declarations().add_subscription(request, answer);
       return asked;
     });
     if (status != NIF_OK) {

@@ -73,6 +73,15 @@ TEST_F(AnswerQueueTest, OneThatIsAskedAgainIsDoneOnce) {
   EXPECT_TRUE(ask(2, kFlagAgain)) << "it never came";
 }
 
+TEST_F(AnswerQueueTest, TheFirstOneThatComesBehindTheSecondIsNotDone) {
+  EXPECT_TRUE(ask(1, kFlagAgain));
+  EXPECT_FALSE(ask(1)) << "it waits";
+  const auto taken = queue_.receive(kNoWait).or_throw();
+  EXPECT_FALSE(ask(1)) << "the program has it";
+  static_cast<void>(queue_.reply(taken.name, "3", kNoWait));
+  EXPECT_FALSE(ask(1)) << "it was answered";
+}
+
 TEST_F(AnswerQueueTest, OneOfWhichNothingIsKeptIsDoneAgainOnlyIfItMayBe) {
   EXPECT_TRUE(ask(1));
   static_cast<void>(queue_.reply(queue_.receive(kNoWait).or_throw().name, "3", kNoWait));
@@ -105,6 +114,9 @@ TEST(AnswerTable, FindsAServiceByItsKey) {
   Uplink uplink;
   AnswerTable table(uplink);
   const auto added = table.add("calc/add");
+  EXPECT_NE(table.add("calc/multiply").key, added.key);
+  EXPECT_NE(AnswerTable(uplink).add("calc/add").key, added.key)
+      << "a program that was started anew";
   EXPECT_EQ(added.key.type, proto::gimi::kRequestType);
   EXPECT_EQ(table.find(added.key), added.queue);
   EXPECT_EQ(table.find({added.key.type + 1, added.key.instance}), nullptr);

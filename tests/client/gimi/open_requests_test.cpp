@@ -10,6 +10,8 @@
 
 #include "client/gimi/answer_queue.hpp"
 #include "gimnet/gimi.hpp"
+#include "proto/control/ns.hpp"
+#include "tests/client/gimi/support/conversation.hpp"
 #include "tests/client/gimi/support/hub_process.hpp"
 
 // Requests between two nodes by a hub: each way in which one ends, and whether it was done.
@@ -74,9 +76,13 @@ TEST_F(OpenRequestsTest, NobodyAnswersThere) {
   const Queue drive = calc_->accept("drive").or_throw();
   const Publisher odom = calc_->advertise("odom").or_throw();
   for (const char* service : {"calc/multiply", "nobody/add", "calc/drive", "calc/odom"}) {
+    const auto begin = std::chrono::steady_clock::now();
     const Reply reply = asker_.request(service, "", kWait);
     EXPECT_TRUE(reply.is(Status::not_found)) << service << ": " << reply.failure().sentence;
     EXPECT_EQ(reply.ran(), Ran::no) << service;
+    EXPECT_LT(std::chrono::steady_clock::now() - begin,
+              std::chrono::nanoseconds(OpenRequests::kRetryForNs))
+        << "it is said at once";
   }
 }
 
@@ -175,6 +181,172 @@ TEST_F(OpenRequestsTest, ManyAtOnceGetTheirOwnReplies) {
   for (auto& thread : asking) thread.join();
   over = true;
   answering.join();
+}
+
+namespace ns = proto::ns;
+using gimi::test::kPeerId;
+using gimi::test::Operation;
+using proto::gimi::kFlagAgain;
+
+/// A node that asks, and the hub's end of its connection. Its session is not resumed after a break.
+class RequestsAtAFakeHub : public gimi::test::Conversation {
+ protected:
+  static constexpr std::uint32_t kGroup = (7u << 20) | 11;
+  static constexpr std::uint64_t kSession = 5;
+
+  RequestsAtAFakeHub() : Conversation(true) {}
+  ~RequestsAtAFakeHub() override {
+    if (asking_.joinable()) asking_.join();
+    hub_.close();
+  }
+
+  void ask() {
+    asking_ = std::thread([this] { reply_.emplace(node_->request("calc/add", "1 2", kWait)); });
+  }
+  /// Waits for the end of the request.
+  const Reply& reply() {
+    if (asking_.joinable()) asking_.join();
+    return *reply_;
+  }
+
+  template <class Request>
+  [[nodiscard]] std::uint16_t take() {
+    std::uint16_t number = 0;
+    EXPECT_TRUE(hub_.next_request<Request>(number));
+    return number;
+  }
+  template <class Answer>
+  void tell(std::uint16_t number, const Answer& answer) {
+    hub_.send_control(proto::Kind::ns, proto::encode_answer(answer, number));
+  }
+  void answer_listing(bool is_there) {
+    ns::ServicesAnswer listed;
+    if (is_there) {
+      ns::ServiceRecord record;
+      record.group = GroupId{kGroup};
+      record.name = "calc/add";
+      record.direction = ns::Direction::accepts;
+      record.message_type = proto::gimi::kRequestType;
+      listed.services.push_back(record);
+    }
+    tell(take<ns::Services>(), listed);
+  }
+  void answer_subscribe(std::uint64_t session = kSession) {
+    ns::SubscribeAnswer place;
+    place.group = GroupId{kGroup};
+    place.provider = NodeId{kPeerId};
+    place.session = session;
+    place.message_type = proto::gimi::kRequestType;
+    place.direction = ns::Direction::accepts;
+    tell(take<ns::Subscribe>(), place);
+  }
+  /// Nobody has the node's name.
+  void answer_resolve(bool learning) {
+    const std::uint16_t number = take<ns::Resolve>();
+    hub_.send_control(proto::Kind::ns, proto::encode_refusal({ns::Resolve::kOperation, number},
+                                                             {proto::Status::not_found,
+                                                              "no node has the name", learning}));
+  }
+
+  /// The next message is the request; 20 s of its time are left, or nearly.
+  gimi::test::Frame next_request() {
+    const auto frame = hub_.next_message();
+    const gimi::test::Taken taken = taken_of(*frame);
+    EXPECT_EQ(taken.header.operation, Operation::request);
+    EXPECT_EQ(taken.frame.dst, kGroup);
+    EXPECT_EQ(taken.data.substr(proto::gimi::kRequestPrefix), "1 2");
+    sequence_ = taken.header.sequence;
+    flags_ = taken.header.flags;
+    return *frame;
+  }
+  /// It was asked, and the hub has its first copy.
+  gimi::test::Frame begin() {
+    ask();
+    answer_listing(true);
+    answer_subscribe();
+    return next_request();
+  }
+  void break_connection() {
+    hub_.close();
+    hub_ = fake_.admit(nif::test::make_welcome());
+  }
+  void refuse(proto::gimi::RequestFault fault) {
+    answer({sequence_, Operation::error, 0, 0}, proto::gimi::encode_request_error({fault, 0, ""}));
+  }
+
+  std::uint32_t sequence_ = 0;
+  std::uint8_t flags_ = 0;
+
+ private:
+  std::thread asking_;
+  std::optional<Reply> reply_;
+};
+
+TEST_F(RequestsAtAFakeHub, AfterABreakARequestIsNamedAgainAndMayHaveBeenDone) {
+  begin();
+  EXPECT_EQ(flags_, 0);
+  const std::uint32_t first = sequence_;
+  break_connection();
+  answer_subscribe();
+  next_request();
+  EXPECT_EQ(sequence_, first);
+  EXPECT_EQ(flags_, kFlagAgain);
+  refuse(proto::gimi::RequestFault::busy);
+  EXPECT_TRUE(reply().is(Status::busy));
+  EXPECT_EQ(reply().ran(), Ran::maybe) << "the first one may have come";
+}
+
+TEST_F(RequestsAtAFakeHub, ADropOfTheSecondSaysNothingOfTheFirst) {
+  begin();
+  break_connection();
+  answer_subscribe();
+  report(proto::DropReason::queue_full, 1, next_request());
+  EXPECT_TRUE(reply().is(Status::not_delivered));
+  EXPECT_EQ(reply().ran(), Ran::maybe);
+}
+
+TEST_F(RequestsAtAFakeHub, OneThatFoundNoWayIsSentAgainAndWasNotDone) {
+  report(proto::DropReason::no_such_group, 1, begin());
+  const auto second = next_request();
+  EXPECT_EQ(flags_, 0) << "the first one did not come";
+  report(proto::DropReason::queue_full, 1, second);
+  EXPECT_TRUE(reply().is(Status::not_delivered));
+  EXPECT_EQ(reply().ran(), Ran::no);
+}
+
+TEST_F(RequestsAtAFakeHub, ALinkThatBrokeLeavesItOpenWhetherItWasDone) {
+  report(proto::DropReason::link_unsure, 1, begin());
+  EXPECT_TRUE(reply().is(Status::not_delivered));
+  EXPECT_EQ(reply().ran(), Ran::maybe);
+}
+
+TEST_F(RequestsAtAFakeHub, AnotherSessionUnderTheSameGroupIsAnotherProgram) {
+  begin();
+  break_connection();
+  answer_subscribe(kSession + 1);
+  EXPECT_TRUE(reply().is(Status::gone));
+  EXPECT_EQ(reply().ran(), Ran::maybe);
+}
+
+TEST_F(RequestsAtAFakeHub, NobodyIsSaidWhenNoNameIsOnItsWay) {
+  ask();
+  for (const bool learning : {true, true, false}) {
+    answer_listing(false);
+    answer_resolve(learning);
+  }
+  EXPECT_TRUE(reply().is(Status::not_found));
+  EXPECT_EQ(reply().ran(), Ran::no);
+}
+
+TEST_F(RequestsAtAFakeHub, RepliesThatNobodyAskedForAreDroppedAndCounted) {
+  begin();
+  answer({sequence_ + 1, Operation::reply, 0, 0}, {});
+  answer({sequence_, Operation::reply, 0, 0, epoch_ + 1}, {});
+  answer({sequence_, Operation::reply, 0, 0}, {}, kPeerId + 1);
+  answer({sequence_, Operation::reply, 0, 0}, std::as_bytes(std::span("3", 1)));
+  answer({sequence_, Operation::reply, 0, 0}, {});
+  EXPECT_EQ(reply().text(), "3");
+  EXPECT_TRUE(gimnet::test::eventually([&] { return node_->dropped() == 4; }));
 }
 
 }  // namespace

@@ -87,7 +87,8 @@ class Conversation : public testing::Test {
   }
 
   /// A DATA, or the answer to what came last.
-  void answer(proto::gimi::MessageHeader header, std::span<const std::byte> data) {
+  void answer(proto::gimi::MessageHeader header, std::span<const std::byte> data,
+              std::uint32_t from = kPeerId) {
     if (header.operation != Operation::data && header.epoch == 0) header.epoch = epoch_;
     std::array<std::byte, proto::gimi::kMessagePrefixMax> prefix;
     const std::size_t size = proto::gimi::write_message_prefix(header, std::nullopt, prefix);
@@ -96,7 +97,7 @@ class Conversation : public testing::Test {
     proto::FrameParts parts;
     parts.header.kind = proto::Kind::unicast;
     parts.header.dst = kOwnId;
-    parts.header.src = kPeerId;
+    parts.header.src = from;
     parts.key = proto::gimi::StreamKey{kKey.type, kKey.instance}.value();
     hub_.send(parts, payload);
   }
