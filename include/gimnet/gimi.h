@@ -49,6 +49,7 @@
 #include "gimnet/gimi_records.h"
 #include "gimnet/gimi_requests.h"
 #include "gimnet/gimi_types.h"
+#include "gimnet/gimi_wait.h"
 
 #ifdef __cplusplus
 extern "C" {

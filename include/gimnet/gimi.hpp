@@ -11,6 +11,7 @@
 #include "gimnet/gimi.h"
 #include "gimnet/gimi/answers.hpp"
 #include "gimnet/gimi/conversions.hpp"
+#include "gimnet/gimi/executor.hpp"
 #include "gimnet/gimi/handles.hpp"
 #include "gimnet/gimi/hub_access.hpp"
 #include "gimnet/gimi/message.hpp"
@@ -18,6 +19,7 @@
 #include "gimnet/gimi/options.hpp"
 #include "gimnet/gimi/outcome.hpp"
 #include "gimnet/gimi/records.hpp"
+#include "gimnet/gimi/wait_set.hpp"
 
 // GIMI: how programs use GIMnet, in C++20 over the C functions of gimnet/gimi.h. Only the standard
 // library is needed, and neither exceptions nor RTTI. docs/gimi.md explains it with
@@ -41,8 +43,9 @@
 // before still comes. Moving: what was moved from may only be destroyed or assigned to; a Node may
 // be closed, too. Times: all that wait take a Timeout in ms and wait for at most that; kForever has
 // no limit, kNoWait does not wait. Only the end of a handle waits without one, a second at most:
-// Node::close(), and the last Publisher, Subscription or Watch. Callbacks: there are none. Received
-// messages wait in queues, which the program empties when it has time.
+// Node::close(), and the last Publisher, Subscription or Watch. Callbacks: the library calls none.
+// Received messages wait in queues, which the program empties when it has time; an Executor calls
+// back in the thread that runs it.
 
 namespace gimnet::inline v0_9 {
 
@@ -80,6 +83,8 @@ class Node : public HubAccess {
   /// answer closed.
   void close() { static_cast<void>(gimi_leave(handle_)); }
 
+  /// For the C functions, and for a WaitSet, which then waits for what receive() takes.
+  [[nodiscard]] gimi_handle c_handle() const { return handle_; }
   [[nodiscard]] Peer peer() const { return Peer{gimi_id(handle_)}; }
   /// After close(): as it was then.
   [[nodiscard]] NodeState state() const {

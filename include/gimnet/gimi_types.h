@@ -12,9 +12,9 @@
 extern "C" {
 #endif
 
-/** Names a node, publisher, subscription, queue, sender, watch, answering service or request: kind
- * (8 bits), slot (24 bits) and generation (32 bits). 0 is no handle. One of another kind, closed,
- * or never given is refused. */
+/** Names a node, publisher, subscription, queue, sender, watch, answering service, request or wait
+ * set: kind (8 bits), slot (24 bits) and generation (32 bits). 0 is no handle. One of another kind,
+ * closed, or never given is refused. */
 typedef uint64_t gimi_handle;
 
 /** The id of a node: hub << 20 | index, shown as `7.17`. 0 is nobody. */

@@ -63,6 +63,19 @@ class Examples(unittest.TestCase):
         publisher.signal(signal.SIGKILL)
         publisher.wait()
 
+    def test_an_executor_and_a_poll_loop_talk(self):
+        hub = Hub(self)
+        start(self, hub, "executor")
+        hub.wait_for_node("robot")
+        loop = start(self, hub, "poll_loop", stdin=subprocess.PIPE)
+        wait_until(lambda: b"x 0.000000" in loop.out, f"a pose; it said: {loop.err}")
+        loop.popen.stdin.write(b"fast\n2\n")
+        loop.popen.stdin.flush()
+        wait_until(lambda: b"'fast' is no speed\n" in loop.out and b"speed 2.000000\n" in loop.out, "the replies")
+        wait_until(lambda: b"x 1." in loop.out, "a pose that moved")
+        loop.popen.stdin.close()
+        self.assertEqual(loop.wait(), 0, loop.err)
+
     def test_a_kicked_publisher_ends(self):
         hub = Hub(self)
         publisher = start(self, hub, "publisher")

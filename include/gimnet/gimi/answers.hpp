@@ -67,6 +67,9 @@ class Answers {
     return Request(request);
   }
 
+  /// For the C functions, and for a WaitSet.
+  [[nodiscard]] gimi_handle c_handle() const { return handle_->value(); }
+
   /// Made by Node.
   explicit Answers(detail::SharedHandle handle) : handle_(std::move(handle)) {}
 
@@ -99,6 +102,9 @@ class PendingReply {
     if (status == GIMI_TIMEOUT && ended.ended == 0) return std::nullopt;
     return Reply(status, ended);
   }
+
+  /// For the C functions, and for a WaitSet.
+  [[nodiscard]] gimi_handle c_handle() const { return handle_->value(); }
 
   /// Made by Node.
   explicit PendingReply(detail::SharedHandle handle) : handle_(std::move(handle)) {}

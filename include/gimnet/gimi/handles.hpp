@@ -77,6 +77,9 @@ class Queue {
   /// Went because it was full.
   [[nodiscard]] std::uint64_t overwritten() const { return detail::counts(number()).overwritten; }
 
+  /// For the C functions, and for a WaitSet.
+  [[nodiscard]] gimi_handle c_handle() const { return number(); }
+
   /// Made by Node and Subscription.
   explicit Queue(detail::SharedHandle handle) : handle_(std::move(handle)) {}
   explicit Queue(Failure failure) : failure_(std::move(failure)) {}
@@ -237,6 +240,9 @@ class Subscription {
     return detail::outcome_of(gimi_standing(handle_->value()));
   }
 
+  /// For the C functions, and for a WaitSet.
+  [[nodiscard]] gimi_handle c_handle() const { return handle_->value(); }
+
   /// Made by Node.
   explicit Subscription(detail::SharedHandle handle) : handle_(std::move(handle)) {}
 
@@ -268,6 +274,9 @@ class Watch {
     if (gimi_watch_receive(handle_->value(), 0, &event) != GIMI_OK) return std::nullopt;
     return detail::event_of(event);
   }
+
+  /// For the C functions, and for a WaitSet.
+  [[nodiscard]] gimi_handle c_handle() const { return handle_->value(); }
 
   /// Made by Node.
   explicit Watch(detail::SharedHandle handle) : handle_(std::move(handle)) {}

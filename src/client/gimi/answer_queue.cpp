@@ -30,6 +30,7 @@ Outcome<TakenRequest> AnswerQueue::receive(Timeout timeout) {
     }
     Waiting next = std::move(waiting_.front());
     waiting_.pop_front();
+    source_.update(!waiting_.empty() || end_);
     if (!is_over(next.deadline_ns)) {
       const std::int64_t left_ms =
           next.deadline_ns == INT64_MAX ? -1 : (next.deadline_ns - steady_now_ns()) / 1'000'000;
@@ -140,6 +141,7 @@ bool AnswerQueue::on_request(const proto::gimi::MessageHeader& header, Message& 
       limited ? steady_now_ns() + std::int64_t{left_ms} * 1'000'000 : INT64_MAX;
   waiting_.push_back({std::move(message), name, deadline});
   filled_.notify_one();
+  source_.update(true);
   return true;
 }
 
@@ -152,6 +154,12 @@ void AnswerQueue::end(const Ending& ending) {
   }
   waiting_.clear();
   filled_.notify_all();
+  source_.update(true);
+}
+
+void AnswerQueue::visit(const SourceVisitor& visitor) {
+  const MutexLock lock(mutex_);
+  visitor(source_, !waiting_.empty() || end_);
 }
 
 AnswerTable::Added AnswerTable::add(const std::string& full_name) {

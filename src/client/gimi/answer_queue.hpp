@@ -13,6 +13,7 @@
 #include "base/mutex.hpp"
 #include "client/gimi/ending.hpp"
 #include "client/gimi/uplink.hpp"
+#include "client/gimi/wait_set.hpp"
 #include "gimnet/gimi/message.hpp"
 #include "gimnet/gimi/outcome.hpp"
 #include "proto/gimi/request.hpp"
@@ -45,6 +46,8 @@ class AnswerQueue {
 
   /// Takes the oldest request whose time is not over. Errors: timeout, closed.
   [[nodiscard]] Outcome<TakenRequest> receive(Timeout timeout) GIMNET_EXCLUDES(mutex_);
+  /// A WaitSet waits for a request here, which may be too late when it is taken.
+  void visit(const SourceVisitor& visitor) GIMNET_EXCLUDES(mutex_);
   /// Answers a request that was taken: once. Errors: closed (it has been answered, or the node
   /// was closed), and those of sending.
   [[nodiscard]] Outcome<void> reply(std::uint64_t name, BytesView data, Timeout timeout)
@@ -89,6 +92,7 @@ class AnswerQueue {
 
   Mutex mutex_;
   Condition filled_;
+  WaitSource source_ GIMNET_GUARDED_BY(mutex_);
   std::deque<Waiting> waiting_ GIMNET_GUARDED_BY(mutex_);             ///< Limit: kWaitingMax
   std::map<std::uint64_t, Way> open_ GIMNET_GUARDED_BY(mutex_);       ///< not answered
   std::deque<std::uint64_t> names_ GIMNET_GUARDED_BY(mutex_);         ///< Limit: kNamesMax

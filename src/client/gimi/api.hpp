@@ -28,6 +28,10 @@ struct NodeObject final : Object {
   explicit NodeObject(SharedCore the_core) : core(std::move(the_core)) {}
   void end() override { core->close(); }
   void abandon() override { core->close(); }
+  bool visit_source(const SourceVisitor& visitor) override {
+    core->inbox().visit_any(visitor);
+    return true;
+  }
   const SharedCore core;
 };
 
@@ -46,6 +50,10 @@ struct Source : Object {
   Source(SharedCore the_core, MessageQueue& the_queue)
       : core(std::move(the_core)), queue(the_queue) {}
   void end() override { core->inbox().leave(queue, closed); }
+  bool visit_source(const SourceVisitor& visitor) override {
+    core->inbox().visit(queue, visitor);
+    return true;
+  }
   const SharedCore core;
   MessageQueue& queue;
   std::atomic<bool> closed{false};  ///< the handle was, whatever becomes of the queue
@@ -78,6 +86,10 @@ struct WatchObject final : Object {
       : core(std::move(the_core)), watch(std::move(the_watch)) {}
   ~WatchObject() override { core->watches().unwatch(watch.number); }
   void end() override { watch.queue->end({Status::closed, "the watch was closed"}); }
+  bool visit_source(const SourceVisitor& visitor) override {
+    watch.queue->visit(visitor);
+    return true;
+  }
   const SharedCore core;
   const WatchTable::Begun watch;
 };

@@ -21,6 +21,9 @@ struct PendingObject final : Object {
       : core(std::move(the_core)), number(the_number) {}
   ~PendingObject() override { core->requests().cancel(number); }
   void end() override { core->requests().leave(closed); }
+  bool visit_source(const SourceVisitor& visitor) override {
+    return core->requests().visit(number, visitor);
+  }
   const SharedCore core;
   const std::uint32_t number;
   std::atomic<bool> closed{false};
@@ -36,6 +39,10 @@ struct AnswersObject final : Object {
     core->answers().remove(added.key);
   }
   void end() override { added.queue->end({Status::closed, "the service was withdrawn"}); }
+  bool visit_source(const SourceVisitor& visitor) override {
+    added.queue->visit(visitor);
+    return true;
+  }
   const SharedCore core;
   const AnswerTable::Added added;
   const std::string name;  ///< without the node's
@@ -135,6 +142,11 @@ gimi_status gimi_ask(gimi_handle node, const char* service, const gimi_bytes* da
   if (reply == nullptr) return is_null("gimi_ask(): reply");
   *reply = {};
   reply->ended = 1;
+  if (is_in_callback()) {
+    return fail(GIMI_BAD_ARGUMENT,
+                "cannot wait for a reply inside a callback, since all others would wait too: ask "
+                "with request_later() or gimi_ask_later(), and wait for it as for the rest");
+  }
   return with_request(node, service, data, options, [&](NodeObject& found, const auto& number) {
     if (!number) return fail(number.failure());
     auto ended = found.core->requests().wait(*number, INT64_MAX);

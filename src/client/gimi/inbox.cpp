@@ -54,6 +54,7 @@ void Inbox::close(MessageQueue& queue) {
 void Inbox::remove(MessageQueue& queue) {
   const MutexLock lock(mutex_);
   if (refusing_ == &queue) refusing_ = nullptr;
+  if (queue.counted) count(queue, false);
   queues_.remove_if([&queue](const MessageQueue& each) { return &each == &queue; });
 }
 
@@ -68,6 +69,7 @@ bool Inbox::push(MessageQueue& queue, Message& message, Receipt* receipt) {
     return false;
   }
   queue.push(std::move(message), ++arrivals_);
+  recount(queue);
   if (receipt != nullptr) receipt->on_kept();
   queue.filled().notify_one();
   if (any_waiters_ != 0) any_.notify_one();
@@ -110,6 +112,7 @@ void Inbox::forget_unasked() {
   MessageQueue* const queue = *goes;
   unasked_.erase(goes);
   dropped_ += queue->size();
+  if (queue->counted) count(*queue, false);
   std::erase_if(by_key_, [queue](const auto& each) { return each.second == queue; });
   queues_.remove_if([queue](const MessageQueue& each) { return &each == queue; });
 }
@@ -125,6 +128,7 @@ void Inbox::bound_unasked() {
     }
     if (oldest == nullptr) return;
     bytes -= oldest->overwrite_oldest();
+    recount(*oldest);
   }
 }
 
@@ -138,7 +142,30 @@ std::uint64_t Inbox::dropped() {
   return dropped_;
 }
 
+void Inbox::count(MessageQueue& queue, bool filled) {
+  queue.counted = filled;
+  if (filled) {
+    ++filled_;
+  } else {
+    --filled_;
+  }
+  const bool has_ended{end_};
+  queue.source().update(filled || has_ended);
+  any_source_.update(filled_ != 0 || has_ended);
+}
+
+void Inbox::visit(MessageQueue& queue, const SourceVisitor& visitor) {
+  const MutexLock lock(mutex_);
+  visitor(queue.source(), !queue.empty() || end_);
+}
+
+void Inbox::visit_any(const SourceVisitor& visitor) {
+  const MutexLock lock(mutex_);
+  visitor(any_source_, filled_ != 0 || end_);
+}
+
 Inbox::News Inbox::news_of(MessageQueue& queue) {
+  recount(queue);
   return {is_room_wanted(queue), !queue.empty(), queue.take_taken()};
 }
 
@@ -263,7 +290,11 @@ void Inbox::end(const Ending& ending) {
   const MutexLock lock(mutex_);
   end_ = ending;
   any_.notify_all();
-  for (MessageQueue& queue : queues_) queue.filled().notify_all();
+  any_source_.update(true);
+  for (MessageQueue& queue : queues_) {
+    queue.filled().notify_all();
+    queue.source().update(true);
+  }
 }
 
 }  // namespace gimnet::gimi

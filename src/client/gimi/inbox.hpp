@@ -66,6 +66,9 @@ class Inbox {
   /// may go for it.
   [[nodiscard]] bool put(MessageKey key, Message& message, Receipt* receipt)
       GIMNET_EXCLUDES(mutex_);
+  /// A WaitSet waits for a message here: of that queue, or of any.
+  void visit(MessageQueue& queue, const SourceVisitor& visitor) GIMNET_EXCLUDES(mutex_);
+  void visit_any(const SourceVisitor& visitor) GIMNET_EXCLUDES(mutex_);
   void count_dropped() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::uint64_t dropped() GIMNET_EXCLUDES(mutex_);
 
@@ -95,6 +98,11 @@ class Inbox {
   [[nodiscard]] bool push(MessageQueue& queue, Message& message, Receipt* receipt)
       GIMNET_REQUIRES(mutex_);
   [[nodiscard]] MessageQueue* first_waiting() GIMNET_REQUIRES(mutex_);
+  /// After each change of what waits in a queue: it may have become empty, or is so no longer.
+  void recount(MessageQueue& queue) GIMNET_REQUIRES(mutex_) {
+    if (queue.counted == queue.empty()) count(queue, !queue.empty());
+  }
+  void count(MessageQueue& queue, bool filled) GIMNET_REQUIRES(mutex_);
   /// Makes room for another key. REQUIRES: there are kUnaskedKeysMax.
   void forget_unasked() GIMNET_REQUIRES(mutex_);
   /// Overwrites the oldest messages beyond kUnaskedBytesMax; the newest one stays.
@@ -116,6 +124,8 @@ class Inbox {
 
   Mutex mutex_;
   Condition any_;
+  WaitSource any_source_ GIMNET_GUARDED_BY(mutex_);
+  std::size_t filled_ GIMNET_GUARDED_BY(mutex_) = 0;  ///< queues with messages
   /// Limit: the queues that the program asked for, and kUnaskedKeysMax
   std::list<MessageQueue> queues_ GIMNET_GUARDED_BY(mutex_);
   std::map<MessageKey, MessageQueue*> by_key_ GIMNET_GUARDED_BY(mutex_);

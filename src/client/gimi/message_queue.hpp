@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/mutex.hpp"
+#include "client/gimi/wait_set.hpp"
 #include "gimnet/gimi/message.hpp"
 #include "gimnet/gimi/options.hpp"
 
@@ -61,6 +62,9 @@ class MessageQueue {
 
   [[nodiscard]] Inbox& inbox() const { return inbox_; }
   [[nodiscard]] Condition& filled() { return filled_; }
+  [[nodiscard]] WaitSource& source() { return source_; }
+  /// Its inbox counts it among those with messages.
+  bool counted = false;
 
  private:
   void make_room(std::size_t messages);
@@ -81,6 +85,7 @@ class MessageQueue {
   std::uint64_t received_ = 0;
   std::uint64_t overwritten_ = 0;
   Condition filled_;
+  WaitSource source_;
 };
 
 }  // namespace gimnet::gimi

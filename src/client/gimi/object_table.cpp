@@ -163,7 +163,12 @@ gimi_status close_object(gimi_handle handle) {
     slot->object->abandon();
     return GIMI_OK;  // the slot stays: whoever was inside at the fork never leaves it
   }
-  if (closes) slot->object->end();
+  if (closes) {
+    Object* const object = slot->object.get();
+    static_cast<void>(
+        object->visit_source([object](WaitSource& source, bool) { source.leave(object); }));
+    object->end();
+  }
   leave_slot(index);
   return closes ? GIMI_OK : GIMI_CLOSED;
 }

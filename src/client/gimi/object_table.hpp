@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "client/gimi/failure.hpp"
+#include "client/gimi/wait_set.hpp"
 #include "gimnet/gimi_types.h"
 
 // From the handles of the C API to what they stand for. A handle is a number (kind, slot,
@@ -22,6 +23,7 @@ enum class HandleKind : std::uint8_t {
   watch = 6,
   pending = 7,
   answers = 8,
+  wait_set = 9,
 };
 
 /// The object that a handle stands for. It lives until its handle is closed and the last call left
@@ -29,6 +31,12 @@ enum class HandleKind : std::uint8_t {
 class Object {
  public:
   virtual ~Object() = default;
+  /// Calls `visitor` with what a WaitSet waits for. False: nothing is received from such a handle,
+  /// or nothing will be any more.
+  virtual bool visit_source(const SourceVisitor& visitor) {
+    static_cast<void>(visitor);
+    return false;
+  }
   /// The handle is closed, in that thread: calls that wait to receive leave.
   virtual void end() {}
   /// In a child after fork(), instead of end() and the destructor: any lock may be held for ever.

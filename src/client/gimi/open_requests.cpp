@@ -165,6 +165,7 @@ void OpenRequests::finish(Open& open, Ended reply) {
   open.again_ns = 0;
   open.reply = std::move(reply);
   ended_.notify_all();
+  open.source.update(true);
 }
 
 void OpenRequests::time_out(Open& open) {
@@ -195,6 +196,20 @@ std::optional<Ended> OpenRequests::wait(std::uint32_t number, std::int64_t until
     if ((left != nullptr && *left) || is_over(until_ns)) return std::nullopt;
     static_cast<void>(ended_.wait_until(mutex_, std::min(until_ns, open.deadline_ns)));
   }
+}
+
+bool OpenRequests::visit(std::uint32_t number, const SourceVisitor& visitor) {
+  bool is_member = false;
+  {
+    const MutexLock lock(mutex_);
+    const auto found = open_.find(number);
+    if (found == open_.end()) return false;
+    Open& open = found->second;
+    visitor(open.source, open.reply.has_value());
+    is_member = open.source.is_member();
+  }
+  if (is_member) attend_();  // whoever waits by a set does not look at the time
+  return true;
 }
 
 void OpenRequests::cancel(std::uint32_t number) {
@@ -309,6 +324,10 @@ bool OpenRequests::tick(std::int64_t now_ns) {
   {
     const MutexLock lock(mutex_);
     for (auto& [number, open] : open_) {
+      if (open.source.is_member() && !open.reply && open.deadline_ns != INT64_MAX) {
+        more = true;
+        if (open.deadline_ns <= now_ns) time_out(open);
+      }
       if (open.again_ns == 0) continue;
       more = true;
       if (now_ns >= open.deadline_ns) time_out(open);

@@ -12,6 +12,7 @@
 #include "client/gimi/ending.hpp"
 #include "client/gimi/stream_table.hpp"
 #include "client/gimi/uplink.hpp"
+#include "client/gimi/wait_set.hpp"
 #include "gimnet/gimi/outcome.hpp"
 #include "gimnet/gimi/requests.hpp"
 #include "proto/gimi/request.hpp"
@@ -69,6 +70,9 @@ class OpenRequests {
   void cancel(std::uint32_t number) GIMNET_EXCLUDES(mutex_);
   /// Sets `left` and has those that wait with it leave.
   void leave(std::atomic<bool>& left) GIMNET_EXCLUDES(mutex_);
+  /// A WaitSet waits for the end of that request here. False: it was given.
+  [[nodiscard]] bool visit(std::uint32_t number, const SourceVisitor& visitor)
+      GIMNET_EXCLUDES(mutex_);
 
   /// True: it took the message, with its storage. `reply` is empty if it is too large.
   [[nodiscard]] bool on_reply(const proto::gimi::MessageHeader& header, Message& reply,
@@ -107,6 +111,7 @@ class OpenRequests {
     bool sent = false;            ///< the last time, and nobody said that it did not arrive
     bool unsure = false;          ///< it was sent before that, and nobody knows what became of it
     std::optional<Ended> reply;
+    WaitSource source;
 
     [[nodiscard]] bool may_have_come() const { return sent || unsure; }
     /// Of an end without an answer.

@@ -37,6 +37,7 @@ Outcome<WatchEvent> WatchQueue::receive(Timeout timeout) {
     }
     entry = std::move(entries_.front());
     entries_.pop_front();
+    source_.update(!entries_.empty() || end_);
   }
   return taken(std::move(entry));
 }
@@ -50,12 +51,19 @@ void WatchQueue::put(WatchEvent event, std::uint32_t watch, bool last) {
   const MutexLock lock(mutex_);
   entries_.push_back({std::move(event), watch, last});
   changed_.notify_all();
+  source_.update(true);
 }
 
 void WatchQueue::end(const Ending& ending) {
   const MutexLock lock(mutex_);
   end_ = ending;
   changed_.notify_all();
+  source_.update(true);
+}
+
+void WatchQueue::visit(const SourceVisitor& visitor) {
+  const MutexLock lock(mutex_);
+  visitor(source_, !entries_.empty() || end_);
 }
 
 Outcome<WatchTable::Begun> WatchTable::watch(const std::string& pattern,

@@ -9,6 +9,7 @@
 #include "base/mutex.hpp"
 #include "client/gimi/ending.hpp"
 #include "client/gimi/uplink.hpp"
+#include "client/gimi/wait_set.hpp"
 #include "gimnet/gimi/handles.hpp"
 
 namespace gimnet::gimi {
@@ -21,6 +22,8 @@ class WatchQueue {
 
   [[nodiscard]] Outcome<WatchEvent> receive(Timeout timeout) GIMNET_EXCLUDES(mutex_);
 
+  /// A WaitSet waits for an event here.
+  void visit(const SourceVisitor& visitor) GIMNET_EXCLUDES(mutex_);
   void put(WatchEvent event, std::uint32_t watch, bool last) GIMNET_EXCLUDES(mutex_);
   void end(const Ending& ending) GIMNET_EXCLUDES(mutex_);
 
@@ -36,6 +39,7 @@ class WatchQueue {
   Uplink& uplink_;
   Mutex mutex_;
   Condition changed_;
+  WaitSource source_ GIMNET_GUARDED_BY(mutex_);
   std::deque<Entry> entries_ GIMNET_GUARDED_BY(mutex_);  ///< Limit: what the hub sends unasked
   Ending end_ GIMNET_GUARDED_BY(mutex_);
 };
