@@ -1,4 +1,4 @@
-// Answers questions: adds the numbers of each question and sends back the sum. See ask.cpp.
+// Answers questions: adds the numbers of each question. See ask.cpp.
 
 #include <iostream>
 #include <sstream>
@@ -6,22 +6,17 @@
 
 #include "gimnet/gimi.hpp"
 
-// The application's own numbers for its messages. Each key has a queue of its own at its receiver.
-constexpr gimnet::MessageKey kQuestion{.type = 1, .instance = 0};
-constexpr gimnet::MessageKey kAnswer{.type = 2, .instance = 0};
-
 int main() try {
-  const gimnet::Node node("adder");
+  const gimnet::Node node("calc");
+  const auto add = node.answer("add").or_throw();  // its full name is calc/add
   for (;;) {
-    const auto question = node.receive(kQuestion).or_throw();
-    std::istringstream words{std::string(question.text())};
-    std::string number;  // of the question; the answer repeats it
-    words >> number;
+    auto question = add.receive().or_throw();  // throws when no connection will come any more
+    std::istringstream numbers{std::string(question.text())};
     double sum = 0.0;
-    for (double summand = 0.0; words >> summand;) sum += summand;
-    const auto sent =
-        node.send(question.from(), number + " " + std::to_string(sum), {.key = kAnswer});
-    // The node that asked may be gone: the next question may be another node's.
+    for (double number = 0.0; numbers >> number;) sum += number;
+    const auto sent = numbers.eof() ? question.reply(std::to_string(sum))
+                                    : question.fail(1, "these are not only numbers");
+    // The program that asked may be gone: the next question may be another one's.
     if (!sent) std::cerr << "adder: " << sent.failure().sentence << '\n';
   }
 } catch (const gimnet::GimnetError& error) {

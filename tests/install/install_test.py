@@ -113,6 +113,18 @@ class Installed(unittest.TestCase):
                 self.run_command([*compiler, *(["-static"] if kind else []), *STRICT, EXAMPLES / example, *flags, "-o", program])
                 self.check_program(program, not kind)
 
+    def test_all_examples_run_with_hub_and_libraries_of_the_prefix(self):
+        programs = self.folder / "examples"
+        programs.mkdir()
+        for source in sorted(EXAMPLES.glob("*.c*")):
+            compiler = ["gcc", "-std=c11"] if source.suffix == ".c" else ["g++", "-std=c++20", "-O0"]
+            flags = self.run_command(["pkg-config", "--cflags", "--libs", "gimi"],
+                                     PKG_CONFIG_PATH=str(self.library / "pkgconfig")).split()
+            self.run_command([*compiler, *STRICT, source, *flags, "-o", programs / source.stem])
+        self.run_command([sys.executable, ROOT / "tests" / "system" / "examples_test.py"], GIMNET_EXAMPLES=str(programs),
+                         GIMNET_BIN=str(self.prefix / "bin"), LD_LIBRARY_PATH=str(self.library), GIMNET_LIBRARY="",
+                         PYTHONPATH=str(self.library / "python3" / "dist-packages"))
+
     def test_a_project_in_c_alone_needs_no_cpp_compiler(self):
         self.by_cmake("only_c", "C", "gcc", "no-such-compiler", PROGRAMS[:2])
 

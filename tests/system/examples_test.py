@@ -1,18 +1,24 @@
 #!/usr/bin/env python3
-"""The programs of examples/, as a newcomer starts them, with a real hub."""
+"""The programs of examples/, as a newcomer starts them, with a real hub: those in C and C++, and those in Python, which understand
+each other. GIMNET_EXAMPLES names another folder with the compiled ones (tests/install)."""
 
 import os
 import pathlib
+import re
 import signal
-import struct
 import subprocess
+import sys
 import unittest
 
-from support.processes import GIMNET, Hub, Process, run_gimnet
+from support.processes import GIMNET, ROOT, Hub, Process, run_gimnet
 from support.waiting import wait_until
-from support.wire import FLAG_KEYED, Client
 
-EXAMPLES = os.path.join(os.path.dirname(GIMNET), "examples")
+EXAMPLES = os.environ.get("GIMNET_EXAMPLES") or os.path.join(os.path.dirname(GIMNET), "examples")
+SCRIPTS = ROOT / "examples" / "python"
+# Their packages and library, unless the environment names others.
+PYTHON = {"PYTHONPATH": os.environ.get("PYTHONPATH") or str(ROOT / "python"), "PYTHONDONTWRITEBYTECODE": "1",
+          "GIMNET_LIBRARY": os.environ.get("GIMNET_LIBRARY", "")}
+LINES_MAX = 80
 # All but SIGKILL and SIGSTOP, which nobody can block, and the two that belong to the C library.
 ALL_SIGNALS = (1 << 64) - 1 & ~(1 << signal.SIGKILL - 1 | 1 << signal.SIGSTOP - 1 | 3 << 31)
 
@@ -28,14 +34,16 @@ def blocked_signals(process):
 
 
 def start(test, hub, name, *arguments, **pipes):
-    process = Process([os.path.join(EXAMPLES, name), *arguments], env={"GIMNET_HUB": hub.url}, **pipes)
+    """NAME is a compiled program, NAME.py one in Python."""
+    command = [sys.executable, str(SCRIPTS / name)] if name.endswith(".py") else [os.path.join(EXAMPLES, name)]
+    process = Process([*command, *arguments], env={"GIMNET_HUB": hub.url, **PYTHON}, **pipes)
     test.addCleanup(process.end)
     return process
 
 
-def gimi(key_type, sequence, data):
-    """The payload of a KEYED message (docs/protocol.md, section 7)."""
-    return struct.pack("<II", key_type, 0) + struct.pack("<IIBBH", 1, sequence, 0, 0, 0) + data
+def shown(process, pattern):
+    """The groups of each line that matches."""
+    return re.findall(rf"^{pattern}$", process.out.decode(), re.M)
 
 
 class Examples(unittest.TestCase):
@@ -45,15 +53,20 @@ class Examples(unittest.TestCase):
         return hub.again(self)
 
     def test_a_subscriber_prints_what_the_publisher_says(self):
+        for which, other in (("publisher", "subscriber.py"), ("publisher.py", "subscriber")):
+            with self.subTest(which):
+                self.publish_over_a_restart(which, other)
+
+    def publish_over_a_restart(self, which, other):
         hub = Hub(self)
-        subscriber = start(self, hub, "subscriber")
-        publisher = start(self, hub, "publisher")
+        subscriber = start(self, hub, other)
+        publisher = start(self, hub, which)
         wait_until(lambda: subscriber.out.count(b"\n") >= 3, f"three messages; it said: {subscriber.err}")
         self.assertRegex(subscriber.out.splitlines()[0].decode(), r"^7\.\d+ #\d+: x \d\.\d{6} y 0$")
-        # Both go on when the hub is back, and the publisher says meanwhile why nothing arrives.
+        # Both go on when the hub is back, and the publisher says meanwhile that nothing arrives.
         hub.process.signal(signal.SIGKILL)
         hub.process.wait()
-        wait_until(lambda: "cannot publish robot/odom: the hub has been away for " in publisher.err,
+        wait_until(lambda: re.search("publisher: (cannot publish robot/odom: the hub has been away for|not sent: .)", publisher.err),
                    f"the reason; it said: {publisher.err}")
         before = subscriber.out.count(b"\n")
         hub.again(self)
@@ -78,42 +91,80 @@ class Examples(unittest.TestCase):
 
     def test_a_kicked_publisher_ends(self):
         hub = Hub(self)
-        publisher = start(self, hub, "publisher")
-        hub.wait_for_node("robot")
-        kicked = run_gimnet(f"unix:{hub.socket_path}", "ctl", "kick", "robot")
-        self.assertEqual((kicked.code, publisher.wait()), (0, 1), kicked.err)
+        for name in ("publisher", "publisher.py"):
+            publisher = start(self, hub, name)
+            hub.wait_for_node("robot")
+            kicked = run_gimnet(f"unix:{hub.socket_path}", "ctl", "kick", "robot")
+            self.assertEqual((kicked.code, publisher.wait()), (0, 1), kicked.err)
 
     def test_each_question_has_its_answer_also_when_the_hub_was_away(self):
-        hub = Hub(self)
-        adder = start(self, hub, "adder")
-        hub.wait_for_node("adder")
-        ask = start(self, hub, "ask", stdin=subprocess.PIPE)
-        ask.popen.stdin.write(b"1.5 2\n")
-        ask.popen.stdin.flush()
-        wait_until(lambda: ask.out == b"1.5 2: 3.500000\n", "the first answer")
-        hub = self.restart(hub)
-        hub.wait_for_node("adder")
-        wait_until(lambda: len(hub.nodes()) == 2, "both are back")
-        ask.feed(b"3\n4 5\n")
-        self.assertEqual((ask.wait(), ask.out, ask.err),
-                         (0, b"1.5 2: 3.500000\n3: 3.000000\n4 5: 9.000000\n", ""))
-        self.assertEqual(adder.err, "")
-
-    def test_a_late_answer_is_not_taken_for_that_to_the_next_question(self):
-        hub = Hub(self)
-        adder = Client(self, hub).join("adder")
-        ask = start(self, hub, "ask", stdin=subprocess.PIPE).feed(b"1\n2\n")
-        for question, answers in ((b"1 1", (b"1 one", b"1 late")), (b"2 2", (b"2 two",))):
-            got = adder.next_data()
-            self.assertEqual(got.payload[20:], question)
-            for sequence, answer in enumerate(answers, 1):
-                adder.send(adder.frame(got.src, gimi(2, int(question[:1]) * 10 + sequence, answer), flags=FLAG_KEYED))
-        self.assertEqual((ask.wait(), ask.out, ask.err), (0, b"1: one\n2: two\n", ""))
+        for which, other in (("adder", "ask.py"), ("adder.py", "ask")):
+            with self.subTest(which):
+                hub = Hub(self)
+                adder = start(self, hub, which)
+                hub.wait_for_node("calc")
+                ask = start(self, hub, other, stdin=subprocess.PIPE)
+                ask.popen.stdin.write(b"1.5 2\n")
+                ask.popen.stdin.flush()
+                wait_until(lambda: ask.out == b"1.5 2: 3.500000\n", f"the first answer; it said: {ask.err}")
+                hub = self.restart(hub)
+                hub.wait_for_node("calc")
+                wait_until(lambda: len(hub.nodes()) == 2, "both are back")
+                ask.feed(b"3\n1 apple\n4 5\n")
+                self.assertEqual((ask.wait(), ask.out), (1, b"1.5 2: 3.500000\n3: 3.000000\n4 5: 9.000000\n"), ask.err)
+                self.assertIn("these are not only numbers", ask.err)
+                self.assertEqual(adder.err, "")
 
     def test_nobody_to_ask_is_said(self):
-        ask = start(self, Hub(self), "ask", stdin=subprocess.PIPE).feed(b"1\n")
-        self.assertEqual(ask.wait(), 1)
-        self.assertIn("adder", ask.err)
+        for name in ("ask", "ask.py"):
+            ask = start(self, Hub(self), name, stdin=subprocess.PIPE).feed(b"1\n")
+            self.assertEqual(ask.wait(), 1)
+            self.assertIn("calc/add", ask.err)
+            self.assertNotIn("may have", ask.err)
+
+    def test_a_pilot_drives_the_robot_and_sees(self):
+        for which, other in (("robot", "pilot.py"), ("robot.py", "pilot")):
+            with self.subTest(which):
+                hub = Hub(self)
+                robot = start(self, hub, which)
+                hub.wait_for_node("robot")
+                pilot = start(self, hub, other, "2", "0", "1")
+                self.assertEqual(pilot.wait(), 0, pilot.err)
+                way = [float(x) for x in shown(pilot, r"x (\S+) y 0\.0+ heading 0\.0+")]
+                self.assertGreater(way[-1], 0.5, pilot.out)
+                self.assertEqual(set(shown(pilot, r"picture \d+, (\d+) bytes")), {"76800"})
+                # Nobody steers any more, so it stands still.
+                watch = start(self, hub, "pilot", "0", "0", "1")
+                self.assertEqual(watch.wait(), 0, watch.err)
+                self.assertEqual(len(set(shown(watch, r"x (\S+) y .*")[2:])), 1, watch.out)
+                self.assertEqual(robot.err, "")
+
+    def test_a_camera_rests_while_nobody_watches(self):
+        for which, other in (("camera", "viewer.py"), ("camera.py", "viewer")):
+            with self.subTest(which):
+                hub = Hub(self)
+                camera = start(self, hub, which)
+                wait_until(lambda: camera.out == b"camera: nobody watches\n", f"it rests; it said: {camera.err}")
+                viewer = start(self, hub, other, "100")
+                wait_until(lambda: len(shown(viewer, r"picture (\d+), 307200 bytes, \d+ skipped")) >= 4, f"pictures; {viewer.err}")
+                numbers = [int(number) for number in shown(viewer, r"picture (\d+), .*")]
+                self.assertGreater(numbers[3] - numbers[1], 2, "a slow viewer skips pictures")
+                viewer.signal(signal.SIGKILL)
+                viewer.wait()
+                wait_until(lambda: camera.out.count(b"nobody watches") == 2, "it rests again")
+
+    def test_they_are_short(self):
+        sources = [path for path in SCRIPTS.parent.rglob("*") if path.suffix in (".c", ".cpp", ".py")]
+        self.assertGreaterEqual(len(sources), 16, "the folder was not understood")
+        for path in sources:
+            self.assertLess(len(path.read_text().splitlines()), LINES_MAX, path)
+
+    def test_control_c_ends_a_program_in_python_without_a_word(self):
+        hub = Hub(self)
+        subscriber = start(self, hub, "subscriber.py")
+        wait_until(lambda: len(hub.nodes()) == 1, f"it is there; {subscriber.err}")
+        subscriber.signal(signal.SIGINT)
+        self.assertEqual((subscriber.wait(), subscriber.err), (0, ""))
 
     def test_the_mirror_sends_back_what_hello_says(self):
         hub = Hub(self)
@@ -132,10 +183,10 @@ class Examples(unittest.TestCase):
 
     def test_the_threads_of_the_libraries_take_no_signals(self):
         hub = Hub(self)
-        for name, threads in (("mirror", 1), ("adder", 2)):  # of NIF; of GIMI, which adds the clerk
+        for name, node, threads in (("mirror", "mirror", 1), ("adder", "calc", 2)):  # of NIF; of GIMI, which adds the clerk
             with self.subTest(name=name):
                 program = start(self, hub, name)
-                hub.wait_for_node(name)
+                hub.wait_for_node(node)
                 blocked = wait_until(lambda: len(blocked_signals(program)) == threads and blocked_signals(program),
                                      "its threads")
                 self.assertEqual([signals & ALL_SIGNALS for signals in blocked.values()], [ALL_SIGNALS] * threads)
@@ -148,7 +199,8 @@ class Examples(unittest.TestCase):
     def test_without_a_hub_they_say_so(self):
         hub = Hub(self)
         hub.process.end()
-        for name in ("publisher", "subscriber", "adder", "ask", "mirror", "hello"):
+        for name in ("publisher", "subscriber", "adder", "ask", "robot", "pilot", "camera", "viewer", "mirror", "hello",
+                     *(path.name for path in SCRIPTS.glob("*.py"))):
             with self.subTest(name=name):
                 process = start(self, hub, name)
                 self.assertEqual(process.wait(), 1)
