@@ -145,7 +145,7 @@ typedef struct nif_subscription {
 /** The part of a service that a subscriber wants. Members that are 0 ask for nothing. */
 typedef struct nif_pace {
   size_t struct_size; /**< sizeof(nif_pace). */
-  uint32_t window;    /**< Of sync(n): fewer than n untaken messages. */
+  uint32_t window;    /**< Untaken messages at most, with any delivery; of sync(n) fewer than n. */
   uint32_t depth;     /**< Newest messages that the hub holds meanwhile; 0: 1, always the latest. At
                          most 64. */
   double rate_hz;     /**< Messages a second at most, the newest at each due time: 0.001..1,000. */

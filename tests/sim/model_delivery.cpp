@@ -29,7 +29,7 @@ std::optional<Model::Terms> Model::pace_of(const Topic& topic, std::uint32_t sub
   const Subscriber& asked = topic.subscribers.at(subscriber);
   Terms terms = asked.terms;
   const std::uint32_t most = window_of(offer);
-  terms.window = terms.window == 0 ? most : std::min(terms.window, most);
+  if (terms.window == 0 || (most != 0 && most < terms.window)) terms.window = most;
   const bool bounded = terms.window != 0 || terms.interval_us != 0 || offer.retain;
   if (!bounded && !asked.once_paced) return std::nullopt;
   return terms;

@@ -170,11 +170,14 @@ void SimNode::know_window(Link& link, const std::string& full_name, const ns::Se
                           std::uint8_t number) {
   Taken& taken = link.taken[state.group.value()];
   link.gone.erase(state.group.value());
-  if (taken.number != number) taken.messages = taken.credited = 0;
+  if (taken.number != number || taken.window == 0) taken.messages = taken.credited = 0;
   taken.number = number;
   taken.window = state.window;
   taken.retained = state.retain;
-  if (state.window == 0) return;
+  if (state.window == 0) {
+    taken.window_most = 0;
+    return;
+  }
   // Who asked for several may have had any of them in force since; 0 is what the provider offers,
   // which may be the most.
   std::uint32_t most = state.window;

@@ -46,8 +46,31 @@ class Latest(unittest.TestCase):
 
 class Windows(unittest.TestCase):
     def test_a_window_of_less_and_a_depth(self):
+        for delivery, window in ((SYNC_DELIVERY, 4), (STREAM_DELIVERY, None)):
+            with self.subTest(delivery=delivery):
+                self.check_a_window(delivery, window)
+
+    def test_a_window_that_comes_back_begins_to_count_anew(self):
         hub = Hub(self)
-        provider = Provider(self, hub, SYNC_DELIVERY, 4)
+        provider = Provider(self, hub, STREAM_DELIVERY)
+        client = Client(self, hub).join()
+        for window in (1, 0, 1):
+            self.assertEqual(subscribe(client, "A/B", window=window).get(10, 0), window)
+            first = provider.publish(10)
+            provider.publish(10)
+            wait_until(lambda: hub.counter("accepted") == provider.sequence, "both are at the hub")
+            came = 1 if window else 2
+            for number in range(first, first + came):
+                got = client.next_where(lambda frame: frame.kind == GROUP)
+                self.assertEqual(struct.unpack_from("<I", got.payload, 12)[0], number)
+            if window:
+                client.send(client.frame(0, struct.pack("<B3xIQ", CREDIT, provider.group, 1), kind=FLOW))
+                got = client.next_where(lambda frame: frame.kind == GROUP)
+                self.assertEqual(struct.unpack_from("<I", got.payload, 12)[0], first + 1)
+
+    def check_a_window(self, delivery, window):
+        hub = Hub(self)
+        provider = Provider(self, hub, delivery, window)
         client = Client(self, hub).join()
         self.assertEqual(subscribe(client, "A/B", window=2, depth=3)[10], 2)
         for _ in range(9):

@@ -184,6 +184,10 @@ proto::Payload handle_subscribe(HandlerContext& context, const Request& request)
         if (!standing || repeated != *terms) {
           if (auto refusal = count_declaration(context, request.session)) return *refusal;
         }
+        // A window where there was none begins new counts, under whatever number.
+        const Topic* const known = context.membership.services().find(wanted.name);
+        const bool counted =
+            standing && known != nullptr && known->window_of(request.session.index) != 0;
         const NameCopies* names = names_for(context, request);
         const auto away =
             names != nullptr ? context.names->away_service(wanted.name) : std::nullopt;
@@ -196,7 +200,7 @@ proto::Payload handle_subscribe(HandlerContext& context, const Request& request)
                   context.membership, names);
         answer.window = (*topic)->window_of(request.session.index);
         answer.number = terms->number;
-        if (answer.window != 0 && (!standing || standing->number != terms->number))
+        if (answer.window != 0 && (!counted || standing->number != terms->number))
           context.counts = CountsBegin{answer.group, terms->number};
         return answer;
       });

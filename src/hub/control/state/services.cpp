@@ -52,7 +52,7 @@ std::optional<SubscriberTerms> Topic::pace_of(NodeIndex subscriber) const {
   SubscriberTerms pace = asked != terms.end() ? asked->second : SubscriberTerms{};
   std::uint32_t most = away ? away->window : 0;
   if (service && service->terms.delivery == proto::ns::Delivery::sync) most = service->terms.window;
-  pace.window = pace.window == 0 ? most : std::min(pace.window, most);
+  if (pace.window == 0 || (most != 0 && most < pace.window)) pace.window = most;
   const bool bounded = pace.window != 0 || pace.interval_us != 0 || retains();
   if (!bounded && !once_paced.contains(subscriber)) return std::nullopt;
   return pace;

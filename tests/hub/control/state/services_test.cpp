@@ -200,11 +200,16 @@ TEST_F(ServicesTest, ASubscriberThatIsRenumberedKeepsItsTerms) {
   EXPECT_THAT(take_words(), IsEmpty()) << "declared again, the same";
 }
 
-TEST_F(ServicesTest, ASubscriberOfAStreamIsPacedOnlyIfItWantsARate) {
+TEST_F(ServicesTest, ASubscriberOfAStreamIsPacedOnlyIfItWantsAWindowOrARate) {
   EXPECT_EQ(advertise(kRobot, "robot/odom"), GroupIndex{1});
-  EXPECT_TRUE(services_.subscribe(kViewer, "robot/odom", {.window = 2, .depth = 3}, effects_));
-  EXPECT_THAT(take_words(), ElementsAre("group 1", "member 2 of 1", "subscribers robot/odom"))
-      << "a window is of sync(n)";
+  EXPECT_TRUE(services_.subscribe(kLogger, "robot/odom", {.window = 2, .depth = 3}, effects_));
+  EXPECT_THAT(take_words(),
+              ElementsAre("group 1", "member 3 of 1", "pace 3 of 1: 2/3", "subscribers robot/odom"))
+      << "a window is of every delivery";
+  EXPECT_FALSE(services_.unsubscribe(kLogger, "robot/odom", now_, effects_));
+  take_words();
+  EXPECT_TRUE(services_.subscribe(kViewer, "robot/odom", {.depth = 3}, effects_));
+  EXPECT_THAT(take_words(), ElementsAre("member 2 of 1", "subscribers robot/odom"));
   EXPECT_TRUE(services_.subscribe(kViewer, "robot/odom", {.interval_us = 1000}, effects_));
   EXPECT_THAT(take_words(), ElementsAre("member 2 of 1", "pace 2 of 1: 0/1, once plain"));
   EXPECT_THAT(services_.find_group(GroupIndex{1})->once_plain, ElementsAre(kViewer))
