@@ -116,9 +116,11 @@ GIMNET_API gimi_status gimi_standing(gimi_handle handle);
  * bytes; "" of a sender to a node. */
 GIMNET_API gimi_status gimi_service_name(gimi_handle handle, char* name, size_t size);
 
-/** Subscribes to a service by its full name; it need not exist yet. A second one of the same name
- * is the same one. GIMI_BAD_NAME (also a name without a /, and a pattern), GIMI_LIMIT, GIMI_DENIED,
- * GIMI_TIMEOUT, GIMI_NOT_CONNECTED, GIMI_NOT_FOUND (it is there and accepts data: send to it). */
+/** Subscribes to a service by its full name; it need not exist yet. Each call makes a queue of its
+ * own. Of several for one name the hub sends what the one wants that wants most, and a message
+ * counts as taken when it is in all their queues. GIMI_BAD_NAME (also a name without a /, and a
+ * pattern), GIMI_BAD_ARGUMENT, GIMI_LIMIT, GIMI_DENIED, GIMI_TIMEOUT, GIMI_NOT_CONNECTED,
+ * GIMI_NOT_FOUND (it is there and accepts data: send to it). */
 GIMNET_API gimi_status gimi_subscribe(gimi_handle node, const char* full_name,
                                       const gimi_subscribe_options* options,
                                       gimi_handle* subscription);

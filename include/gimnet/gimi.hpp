@@ -200,15 +200,14 @@ class Node : public HubAccess {
       return gimi_accept(handle_, std::string(name).c_str(), &how, made);
     });
   }
-  /// Subscribes to a service by its full name; it need not exist yet. A second one of the same name
-  /// is the same one; where the hub did not take that again after a break, it is asked once more.
-  /// Errors: bad_name (also of a name without a /, which no service has, and of a pattern, which
-  /// watch() takes), limit, denied, timeout, not_connected, not_found (it is there and accepts
-  /// data: send to it).
-  Outcome<Subscription> subscribe(std::string_view full_name, const QueueOptions& options = {},
-                                  Timeout timeout = Timeout{5000},
-                                  const PaceOptions& pace = {}) const {
-    const gimi_subscribe_options how = detail::options_of(options, pace, timeout);
+  /// Subscribes to a service by its full name; it need not exist yet. Each call makes a queue of
+  /// its own. Of several for one name the hub sends what the one wants that wants most, and a
+  /// message counts as taken when it is in all their queues. Errors: bad_name (also of a name
+  /// without a /, which no service has, and of a pattern, which watch() takes), bad_argument,
+  /// limit, denied, timeout, not_connected, not_found (it is there and accepts data: send to it).
+  Outcome<Subscription> subscribe(std::string_view full_name,
+                                  const SubscribeOptions& options = {}) const {
+    const gimi_subscribe_options how = detail::options_of(options);
     return detail::made<Subscription>([&](gimi_handle* made) {
       return gimi_subscribe(handle_, std::string(full_name).c_str(), &how, made);
     });

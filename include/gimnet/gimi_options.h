@@ -56,24 +56,30 @@ typedef struct gimi_node_options {
 
 typedef struct gimi_queue_options {
   size_t struct_size;
-  /** 1..GIMI_QUEUE_MESSAGES_MAX; 0: 64, and of a subscription to a service with GIMI_LATEST 1,
-   * which a newer message overwrites, whatever at_full says. */
-  size_t messages;
+  size_t messages; /**< 1..GIMI_QUEUE_MESSAGES_MAX; 0: 64. */
   gimi_at_full_queue at_full;
   int32_t reserved;
 } gimi_queue_options;
 
-/** A subscription: its queue, and its share of the service. */
+/** The wishes of a subscriber. Every wish works with every delivery (docs/gimi.md). */
 typedef struct gimi_subscribe_options {
   size_t struct_size;
-  size_t messages; /**< As in gimi_queue_options. */
-  gimi_at_full_queue at_full;
-  uint32_t window;    /**< Of GIMI_SYNC: fewer untaken messages than the service allows; 0: as it
-                         allows. */
-  uint32_t depth;     /**< Newest messages that the hub holds meanwhile; 0: 1, at most 64. */
-  int32_t timeout_ms; /**< For the hub's answer; 0: 5,000. */
   double rate_hz; /**< Messages a second at most, the newest at each due time, 0.001..1,000; 0: no
                      bound. */
+  /** Messages that may wait, 1..GIMI_QUEUE_MESSAGES_MAX. 0: 64; and with newest_only, with rate_hz
+   * and of a service with GIMI_LATEST 1, which a newer message overwrites, whatever at_full says.
+   */
+  size_t queue;
+  gimi_at_full_queue at_full;
+  int32_t timeout_ms;  /**< For the hub's answer; 0: 5,000. */
+  uint8_t newest_only; /**< Not 0: only the newest message waits, in the queue and at the hub; queue
+                          is 0 or 1. */
+  uint8_t reserved[7];
+  /** For experts: untaken messages, 1..1,024. 0: 2 with newest_only, else any number, and of
+   * GIMI_SYNC as many as the service allows, which is the most. */
+  uint32_t window;
+  uint32_t depth; /**< For experts: newest messages that the hub holds at a full window; 0: 1, at
+                     most 64. */
 } gimi_subscribe_options;
 
 typedef struct gimi_send_options {

@@ -75,8 +75,9 @@ class gimi_node_options(ctypes.Structure):
 
 
 class gimi_subscribe_options(ctypes.Structure):
-    _fields_ = [("struct_size", c_size_t), ("messages", c_size_t), ("at_full", c_int32), ("window", c_uint32),
-                ("depth", c_uint32), ("timeout_ms", c_int32), ("rate_hz", c_double)]
+    _fields_ = [("struct_size", c_size_t), ("rate_hz", c_double), ("queue", c_size_t), ("at_full", c_int32),
+                ("timeout_ms", c_int32), ("newest_only", c_uint8), ("reserved", c_uint8 * 7), ("window", c_uint32),
+                ("depth", c_uint32)]
 
 
 class gimi_send_options(ctypes.Structure):

@@ -152,12 +152,13 @@ class Node(Handle):
                          retain=retain, metadata=to_text(metadata), timeout_ms=to_ms(timeout))
         return Publisher(self, self._opened(_c.lib.gimi_advertise, to_text(name), options))
 
-    def subscribe(self, full_name: str, *, rate_hz: float = 0.0, queue: int = 0, window: int = 0, depth: int = 0,
-                  timeout: float = 5.0) -> Source:
-        """Subscribes to a service, which need not exist yet. `queue`: messages that may wait; the oldest
-        is overwritten. `rate_hz`: the newest at each due time. BadName, NotFound (it takes commands)."""
-        options = sized(_c.gimi_subscribe_options, messages=queue, window=window, depth=depth, rate_hz=rate_hz,
-                         timeout_ms=to_ms(timeout))
+    def subscribe(self, full_name: str, *, rate_hz: float = 0.0, newest_only: bool = False, queue: int = 0,
+                  window: int = 0, depth: int = 0, timeout: float = 5.0) -> Source:
+        """Subscribes to a service, which need not exist yet; each call has a queue of its own. `rate_hz`: the
+        newest at each due time. `newest_only`: only the newest waits. `queue`: messages that may wait; the
+        oldest is overwritten. `window`, `depth`: for experts. BadName, NotFound (it takes commands)."""
+        options = sized(_c.gimi_subscribe_options, rate_hz=rate_hz, queue=queue, timeout_ms=to_ms(timeout),
+                         newest_only=newest_only, window=window, depth=depth)
         return Source(self, self._opened(_c.lib.gimi_subscribe, to_text(full_name), options))
 
     def accept(self, name: str, *, queue: int = 0, key: Tuple[int, int] = (0, 0), metadata: str = "",

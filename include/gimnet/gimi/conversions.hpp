@@ -69,16 +69,16 @@ using SharedHandle = std::shared_ptr<const Handle>;
   return how;
 }
 
-[[nodiscard]] inline gimi_subscribe_options options_of(const QueueOptions& queue,
-                                                       const PaceOptions& pace, Timeout timeout) {
+[[nodiscard]] inline gimi_subscribe_options options_of(const SubscribeOptions& options) {
   gimi_subscribe_options how{};
   how.struct_size = sizeof how;
-  how.messages = queue.messages;
-  how.at_full = static_cast<gimi_at_full_queue>(queue.at_full);
-  how.window = pace.window;
-  how.depth = pace.depth;
-  how.rate_hz = pace.rate_hz;
-  how.timeout_ms = milliseconds_in_options(timeout);
+  how.rate_hz = options.rate_hz;
+  how.queue = options.queue;
+  how.at_full = static_cast<gimi_at_full_queue>(options.at_full);
+  how.timeout_ms = milliseconds_in_options(options.timeout);
+  how.newest_only = options.newest_only ? 1 : 0;
+  how.window = options.window;
+  how.depth = options.depth;
   return how;
 }
 

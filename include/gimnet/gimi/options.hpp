@@ -80,9 +80,7 @@ enum class AtFullQueue : std::int32_t {
 };
 
 struct QueueOptions {
-  /// 1..kQueueMessagesMax; 0: kQueueMessagesDefault, and of a subscription to a service with
-  /// Delivery::latest 1, which a newer message overwrites, whatever `at_full` says.
-  std::size_t messages = 0;
+  std::size_t messages = 0;  ///< 1..kQueueMessagesMax; 0: kQueueMessagesDefault
   AtFullQueue at_full = AtFullQueue::overwrite_oldest;
 };
 
@@ -94,15 +92,24 @@ enum class AtFullWindow : std::int32_t {
                 ///< room
 };
 
-/// A subscriber's share of a service. The program takes a message when it fetches it from
-/// the queue, or when the queue overwrites it.
-struct PaceOptions {
-  std::uint32_t window =
-      0;  ///< of Delivery::sync: fewer untaken messages than the service allows; 0: as it allows
-  std::uint32_t depth =
-      1;  ///< newest messages that the hub holds meanwhile; 1: always the latest. At most 64
-  double rate_hz =
-      0.0;  ///< messages a second at most, the newest at each due time, 0.001..1,000; 0: no bound
+/// The wishes of a subscriber. Every wish works with every delivery. The program takes a
+/// message when it fetches it from the queue, or when the queue overwrites it.
+struct SubscribeOptions {
+  double rate_hz = 0.0;  ///< messages a second at most, the newest at each due time, 0.001..1,000;
+                         ///< 0: no bound
+  /// Only the newest message waits, in the queue and at the hub; `queue` is 0 or 1.
+  bool newest_only = false;
+  /// Messages that may wait, 1..kQueueMessagesMax. 0: kQueueMessagesDefault; and with newest_only,
+  /// with rate_hz and of a service with Delivery::latest 1, which a newer message overwrites,
+  /// whatever `at_full` says.
+  std::size_t queue = 0;
+  AtFullQueue at_full = AtFullQueue::overwrite_oldest;
+  Timeout timeout{5000};  ///< for the hub's answer
+  /// For experts: untaken messages, 1..1,024. 0: 2 with newest_only, else any number, and of
+  /// Delivery::sync as many as the service allows, which is the most.
+  std::uint32_t window = 0;
+  /// For experts: newest messages that the hub holds at a full window, 1..64; 0: 1.
+  std::uint32_t depth = 0;
 };
 
 struct SendOptions {

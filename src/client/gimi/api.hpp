@@ -61,10 +61,11 @@ struct Source : Object {
 
 struct SubscriptionObject final : Source {
   static constexpr HandleKind kKind = HandleKind::subscription;
-  SubscriptionObject(SharedCore the_core, ServiceTable::Subscribed the_service)
-      : Source(std::move(the_core), the_service->queue()), service(std::move(the_service)) {}
-  ~SubscriptionObject() override { core->services().unsubscribe(service); }
-  const ServiceTable::Subscribed service;
+  SubscriptionObject(SharedCore the_core, ServiceTable::Reading the_reading)
+      : Source(std::move(the_core), the_reading.reader->queue), reading(std::move(the_reading)) {}
+  ~SubscriptionObject() override { core->services().unsubscribe(reading); }
+  [[nodiscard]] SubscribedService& service() const { return *reading.service; }
+  const ServiceTable::Reading reading;
 };
 
 struct QueueObject final : Source {

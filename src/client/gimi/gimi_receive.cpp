@@ -162,9 +162,11 @@ gimi_status gimi_counts(gimi_handle source, gimi_queue_counts* counts) {
   return with_source(source, [&](Source& found) -> gimi_status {
     if (!nif::has_size(counts)) return is_null("gimi_counts(): counts, or its struct_size,");
     const Inbox::Counts now = found.core->inbox().counts(found.queue);
-    const bool subscribed = ref.kind() == HandleKind::subscription;
-    const std::uint64_t missed =
-        subscribed ? static_cast<SubscriptionObject&>(found).service->missed() : 0;
+    std::uint64_t missed = 0;
+    if (ref.kind() == HandleKind::subscription) {
+      const ServiceTable::Reading& reading = static_cast<SubscriptionObject&>(found).reading;
+      missed = reading.service->missed(*reading.reader) + now.overwritten;
+    }
     nif::write_struct(gimi_queue_counts{sizeof(gimi_queue_counts), now.size, now.received,
                                         now.overwritten, missed},
                       *counts);

@@ -94,7 +94,7 @@ gimi_status gimi_standing(gimi_handle handle) {
   const ObjectRef ref = find_object(handle);
   if (ref.object() != nullptr && ref.kind() == HandleKind::subscription) {
     return guarded([&] {
-      return answer(static_cast<SubscriptionObject*>(ref.object())->service->standing());
+      return answer(static_cast<SubscriptionObject*>(ref.object())->service().standing());
     });
   }
   return with<PublisherObject>(
@@ -112,7 +112,7 @@ gimi_status gimi_service_name(gimi_handle handle, char* name, size_t size) {
         copy_text(static_cast<PublisherObject*>(ref.object())->service.full_name(), name, size);
         return GIMI_OK;
       case HandleKind::subscription:
-        copy_text(static_cast<SubscriptionObject*>(ref.object())->service->name(), name, size);
+        copy_text(static_cast<SubscriptionObject*>(ref.object())->service().name(), name, size);
         return GIMI_OK;
       case HandleKind::sender:
         copy_text(static_cast<SenderObject*>(ref.object())->stream->service(), name, size);
@@ -130,12 +130,23 @@ gimi_status gimi_subscribe(gimi_handle node, const char* full_name,
   *subscription = 0;
   return with<NodeObject>(node, [&](NodeObject& found) {
     return with_options(options, "subscribe", "gimi_subscribe_options", [&](const auto& given) {
-      const QueueOptions queue{given.messages, static_cast<AtFullQueue>(given.at_full)};
-      PaceOptions pace{given.window, given.depth == 0 ? 1 : given.depth, given.rate_hz};
-      auto service = found.core->services().subscribe(full_name, queue, pace,
-                                                      timeout_in_options(given.timeout_ms));
-      if (!service) return fail(service.failure());
-      return give<SubscriptionObject>(subscription, found.core, std::move(*service));
+      SubscribeOptions how;
+      how.rate_hz = given.rate_hz;
+      how.newest_only = given.newest_only != 0;
+      how.queue = given.queue;
+      how.at_full = static_cast<AtFullQueue>(given.at_full);
+      how.timeout = timeout_in_options(given.timeout_ms);
+      how.window = given.window;
+      how.depth = given.depth;
+      if (how.newest_only && how.queue > 1) {
+        return fail(GIMI_BAD_ARGUMENT, "cannot subscribe to '" + text_of(full_name) +
+                                           "': newest_only keeps one message, so that a queue of " +
+                                           std::to_string(how.queue) +
+                                           " has no use; leave one of them out");
+      }
+      auto reading = found.core->services().subscribe(full_name, how);
+      if (!reading) return fail(reading.failure());
+      return give<SubscriptionObject>(subscription, found.core, std::move(*reading));
     });
   });
 }
@@ -144,15 +155,15 @@ gimi_status gimi_provider(gimi_handle subscription, gimi_direction* provider) {
   if (provider == nullptr) return is_null("gimi_provider(): provider");
   *provider = GIMI_NOBODY;
   return with<SubscriptionObject>(subscription, [&](SubscriptionObject& found) -> gimi_status {
-    if (found.service->exists()) *provider = GIMI_PROVIDES;
-    if (found.service->accepts()) *provider = GIMI_ACCEPTS;
+    if (found.service().exists()) *provider = GIMI_PROVIDES;
+    if (found.service().accepts()) *provider = GIMI_ACCEPTS;
     return GIMI_OK;
   });
 }
 
 gimi_status gimi_wait_until_exists(gimi_handle subscription, int32_t timeout_ms) {
   return with<SubscriptionObject>(subscription, [&](SubscriptionObject& found) {
-    return answer(found.service->wait_until_exists(timeout_of(timeout_ms)));
+    return answer(found.service().wait_until_exists(timeout_of(timeout_ms)));
   });
 }
 

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "client/gimi/ending.hpp"
+#include "client/gimi/message.hpp"
 
 namespace gimnet::gimi {
 namespace {
@@ -41,21 +42,17 @@ MessageQueue& Inbox::add_queue(const QueueOptions& options) {
   return queues_.emplace_back(*this, options, bytes_max_);
 }
 
-void Inbox::close(MessageQueue& queue) {
+void Inbox::remove(MessageQueue& queue) {
   News news;
   {
     const MutexLock lock(mutex_);
-    queue.close();
-    news = news_of(queue);
+    static_cast<void>(queue.pop_newest());
+    news = {refusing_ == &queue, false, queue.take_taken()};
+    if (news.room) refusing_ = nullptr;
+    if (queue.counted) count(queue, false);
+    queues_.remove_if([&queue](const MessageQueue& each) { return &each == &queue; });
   }
   tell(news);
-}
-
-void Inbox::remove(MessageQueue& queue) {
-  const MutexLock lock(mutex_);
-  if (refusing_ == &queue) refusing_ = nullptr;
-  if (queue.counted) count(queue, false);
-  queues_.remove_if([&queue](const MessageQueue& each) { return &each == &queue; });
 }
 
 std::size_t Inbox::queues() {
@@ -82,6 +79,28 @@ bool Inbox::put(MessageQueue& queue, Message& message, Receipt* receipt) {
     const MutexLock lock(mutex_);
     if (!push(queue, message, receipt)) return false;
     news.taken = queue.take_taken();
+  }
+  tell(news);
+  return true;
+}
+
+bool Inbox::put_in_all(std::span<MessageQueue* const> queues, Message& message) {
+  News news;
+  {
+    const MutexLock lock(mutex_);
+    for (MessageQueue* queue : queues) {
+      if (!queue->refuses()) continue;
+      refusing_ = queue;
+      return false;
+    }
+    if (epoch_of(message) != 0) news.taken.push_back({group_of(message), epoch_of(message), 1});
+    message = without_count(std::move(message));
+    for (MessageQueue* queue : queues) {
+      Message one = queue == queues.back() ? std::move(message) : share(message);
+      static_cast<void>(push(*queue, one, nullptr));  // as asked before
+      const auto overwritten = queue->take_taken();
+      news.taken.insert(news.taken.end(), overwritten.begin(), overwritten.end());
+    }
   }
   tell(news);
   return true;

@@ -7,6 +7,7 @@
 #include <list>
 #include <map>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "base/mutex.hpp"
@@ -52,15 +53,15 @@ class Inbox {
   MessageQueue& queue(MessageKey key, const QueueOptions* options) GIMNET_EXCLUDES(mutex_);
   /// A queue for a subscription, until remove().
   MessageQueue& add_queue(const QueueOptions& options) GIMNET_EXCLUDES(mutex_);
-  /// Nobody takes messages out of it any more: what waits there is dropped, and what comes, until
-  /// set() opens it again.
-  void close(MessageQueue& queue) GIMNET_EXCLUDES(mutex_);
-  /// REQUIRES: add_queue() made it, and nobody uses it any more.
+  /// What waits there counts as taken. REQUIRES: add_queue() made it, and nobody uses it any more.
   void remove(MessageQueue& queue) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::size_t queues() GIMNET_EXCLUDES(mutex_);
 
   /// False: no room, the message is unchanged; on_room() will be called. `receipt` may be null.
   [[nodiscard]] bool put(MessageQueue& queue, Message& message, Receipt* receipt)
+      GIMNET_EXCLUDES(mutex_);
+  /// As put() to each of several queues, or to none. The message counts as taken then.
+  [[nodiscard]] bool put_in_all(std::span<MessageQueue* const> queues, Message& message)
       GIMNET_EXCLUDES(mutex_);
   /// As put() to the queue of the key. Where nobody asked for the key, older messages of such keys
   /// may go for it.

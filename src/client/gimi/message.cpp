@@ -49,6 +49,20 @@ Message begin_stream(Message message) {
   return Message(begins);
 }
 
+Message share(const Message& message) {
+  const gimi_message& shared = message.c_message();
+  for (void* storage : {shared.storage, shared.name_storage}) {
+    if (storage != nullptr) static_cast<nif::Storage*>(storage)->add_reference();
+  }
+  return Message(shared);
+}
+
+Message without_count(Message message) {
+  gimi_message uncounted = message.give_up();
+  uncounted.counted[1] = 0;
+  return Message(uncounted);
+}
+
 void disown(Message message) {
   gimi_message held = message.give_up();
   held.storage = nullptr;

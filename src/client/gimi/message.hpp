@@ -32,6 +32,10 @@ using OwnedServiceName = std::unique_ptr<ServiceName, ReleaseServiceName>;
                                          ServiceName* service, std::uint32_t reconnects);
 /// The message, whose sender began the stream anew.
 [[nodiscard]] Message begin_stream(Message message);
+/// The same message once more: both keep its bytes.
+[[nodiscard]] Message share(const Message& message);
+/// The message, which counts in no window any more.
+[[nodiscard]] Message without_count(Message message);
 /// Gives the storage back to who holds NIF's message.
 void disown(Message message);
 

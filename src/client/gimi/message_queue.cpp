@@ -9,17 +9,10 @@
 namespace gimnet::gimi {
 
 void MessageQueue::set(const QueueOptions& options) {
-  closed_ = false;
   options_ = options;
   options_.messages =
       options.messages == 0 ? kQueueMessagesDefault : std::min(options.messages, kQueueMessagesMax);
   make_room(options_.messages);
-}
-
-void MessageQueue::close() {
-  closed_ = true;
-  entries_.clear();
-  bytes_ = 0;
 }
 
 bool MessageQueue::refuses() const {
@@ -29,7 +22,6 @@ bool MessageQueue::refuses() const {
 
 void MessageQueue::push(Message message, std::uint64_t arrival) {
   GIMNET_ASSERT(!refuses());
-  if (closed_) return;
   make_room(options_.messages - 1);
   bytes_ += message.size();
   ++received_;

@@ -32,10 +32,7 @@ class MessageQueue {
     set(options);
   }
 
-  /// Also opens it again.
   void set(const QueueOptions& options);
-  /// Drops what waits, and what comes.
-  void close();
   void resize(std::size_t messages) { set({messages, options_.at_full}); }
 
   /// It would refuse. A message fits into an empty queue, whatever its size.
@@ -80,7 +77,6 @@ class MessageQueue {
   QueueOptions options_;
   std::deque<Entry> entries_;  ///< Limit: bytes_max_ and the options' messages
   std::vector<TakenMessages> taken_;
-  bool closed_ = false;
   std::size_t bytes_ = 0;
   std::uint64_t received_ = 0;
   std::uint64_t overwritten_ = 0;

@@ -148,22 +148,25 @@ nif_verdict Reception::on_plain(const nif_incoming& in) {
     losses_.add(proto::DropReason::too_large, 1);
     return NIF_DONE;
   }
-  MessageQueue* queue = nullptr;
-  ServiceTable::Subscribed service;
-  if (in.kind == NIF_GROUP) {
-    auto [place, found] = services_.subscribed(in.group != 0 ? in.group : in.to);
-    if (place == ServiceTable::Place::unknown) losses_.add_unknown_service();
-    if (found == nullptr) return verdict_of(place);
-    queue = &found->queue();
-    service = std::move(found);
+  if (in.kind != NIF_GROUP) {
+    Message message = make_plain_message(in, data, nullptr, reconnects_);
+    if (inbox_.put(MessageKey{}, message, nullptr)) return NIF_KEEP;
+    disown(std::move(message));
+    return NIF_NOT_NOW;
   }
-  ServiceName* const name = service == nullptr ? nullptr : &service->shared_name();
-  Message message = make_plain_message(in, data, name, reconnects_);
-  const bool taken = queue != nullptr ? inbox_.put(*queue, message, nullptr)
-                                      : inbox_.put(MessageKey{}, message, nullptr);
-  if (taken) return NIF_KEEP;
+  const auto [place, service] = services_.subscribed(in.group != 0 ? in.group : in.to);
+  if (place == ServiceTable::Place::unknown) losses_.add_unknown_service();
+  if (service == nullptr) return verdict_of(place);
+  return put(*service, {}, make_plain_message(in, data, &service->shared_name(), reconnects_));
+}
+
+nif_verdict Reception::put(SubscribedService& service,
+                           const std::optional<SubscribedService::Position>& position,
+                           Message message) {
+  const SubscribedService::Put put = service.put(position, message);
+  if (put == SubscribedService::Put::kept) return NIF_KEEP;
   disown(std::move(message));
-  return NIF_NOT_NOW;
+  return put == SubscribedService::Put::no_room ? NIF_NOT_NOW : NIF_DONE;
 }
 
 nif_verdict Reception::drop_outdated() {
@@ -175,23 +178,14 @@ nif_verdict Reception::on_group_data(const nif_incoming& in, const proto::gimi::
   const auto [place, service] = services_.subscribed(in.group != 0 ? in.group : in.to);
   if (place == ServiceTable::Place::unknown) losses_.add_unknown_service();
   if (service == nullptr) return verdict_of(place);
-  // After a break the hub gives the last message of a retained service again: it does not know who
-  // had it.
   const StreamName name = stream_of(in, in.from, 0);
   const SubscribedService::Position position{name.peer, name.key, view.header.epoch,
                                              view.header.sequence};
-  if (service->is_repeated(position)) return NIF_DONE;
   const StreamEpochs::Step step = service->look(position);
   if (step == StreamEpochs::Step::former) return drop_outdated();
   Message message = make_message(in, view, &service->shared_name(), reconnects_);
   if (step == StreamEpochs::Step::begins) message = begin_stream(std::move(message));
-  service->count_missed(position);
-  if (!inbox_.put(service->queue(), message, nullptr)) {
-    disown(std::move(message));
-    return NIF_NOT_NOW;
-  }
-  service->on_message(position);
-  return NIF_KEEP;
+  return put(*service, position, std::move(message));
 }
 
 nif_verdict Reception::refuse(const nif_incoming& in, const proto::gimi::MessageView& view) {

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 
 #include "client/gimi/answer_queue.hpp"
 #include "client/gimi/clerk.hpp"
@@ -68,6 +69,10 @@ class Reception {
   [[nodiscard]] nif_verdict on_plain(const nif_incoming& in);
   [[nodiscard]] nif_verdict on_group_data(const nif_incoming& in,
                                           const proto::gimi::MessageView& view);
+  /// A message of a service, for its readers.
+  [[nodiscard]] nif_verdict put(SubscribedService& service,
+                                const std::optional<SubscribedService::Position>& position,
+                                Message message);
   /// Of a stream that its sender has begun anew since.
   [[nodiscard]] nif_verdict drop_outdated();
   /// A message that is larger than this node takes: its sender is told.

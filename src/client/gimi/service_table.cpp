@@ -117,11 +117,11 @@ void ServiceTable::withdraw_accepted(const std::string& name) {
   static_cast<void>(nif_withdraw_service(uplink_.node(), name.c_str(), kLeaveTimeoutMs));
 }
 
-ServiceTable::Subscribed ServiceTable::entry(const std::string& full_name,
-                                             const QueueOptions& options) {
+ServiceTable::Subscribed ServiceTable::entry(const std::string& full_name) {
+  const MutexLock lock(mutex_);
   const auto place = subscribed_.find(full_name);
   if (place != subscribed_.end()) return place->second;
-  auto service = std::make_shared<SubscribedService>(full_name, inbox_, options);
+  auto service = std::make_shared<SubscribedService>(full_name, inbox_);
   if (end_) service->end(end_);
   return subscribed_.emplace(full_name, std::move(service)).first->second;
 }
@@ -135,7 +135,6 @@ void ServiceTable::set_place(const Subscribed& subscribed, const ServicePlace& p
   service.place = place;
   service.on_place(place);
   if (place.group == 0) return;
-  if (service.read) inbox_.set(service.queue(), service.queue_options());
   subscribed_by_group_[place.group] =
       subscribed;  // also a former one again, which was another service's meanwhile
   std::erase(service.groups, place.group);
@@ -151,13 +150,14 @@ void ServiceTable::forget_group(SubscribedService& service, std::uint32_t group)
     subscribed_by_group_.erase(place);
 }
 
-nif_status ServiceTable::ask(const Subscribed& service, const PaceOptions& pace,
-                             std::int32_t timeout_ms) {
+nif_status ServiceTable::ask(const Subscribed& service, Timeout timeout) {
   nif_subscription found{};
-  const nif_pace wanted{sizeof wanted, pace.window, pace.depth, pace.rate_hz};
-  const nif_status status =
-      nif_subscribe_paced(uplink_.node(), service->name().c_str(), &wanted, &found, timeout_ms);
+  const Share share = service->share();
+  const nif_pace wanted{sizeof wanted, share.window, share.depth, share.rate_hz};
+  const nif_status status = nif_subscribe_paced(uplink_.node(), service->name().c_str(), &wanted,
+                                                &found, nif_timeout(timeout));
   if (status != NIF_OK) return status;
+  service->retained = found.retain != 0;
   const ServicePlace place{found.group,
                            found.provider,
                            found.session,
@@ -174,73 +174,56 @@ nif_status ServiceTable::ask(const Subscribed& service, const PaceOptions& pace,
   return NIF_OK;
 }
 
-Outcome<ServiceTable::Subscribed> ServiceTable::subscribe(const std::string& full_name,
-                                                          const QueueOptions& options,
-                                                          const PaceOptions& pace,
-                                                          Timeout timeout) {
+Outcome<ServiceTable::Reading> ServiceTable::subscribe(const std::string& full_name,
+                                                       const SubscribeOptions& wish) {
   const MutexLock turn(asking_);
   const Asking asking(*this);
-  Subscribed service;
-  {
-    const MutexLock lock(mutex_);
-    service = entry(full_name, options);
-    service->read = true;
-    service->chosen_queue = options;
-    inbox_.set(service->queue(), service->queue_options());
+  const Subscribed service = entry(full_name);
+  const bool is_first = !service->is_read();
+  const Reading reading{service, service->add(wish)};
+  nif_status status = ask(service, wish.timeout);
+  if (status == NIF_OK && !is_first && service->retained) {
+    // The hub gives the last message to who begins, and this reader does.
+    static_cast<void>(nif_unsubscribe(uplink_.node(), full_name.c_str(), kLeaveTimeoutMs));
+    status = ask(service, wish.timeout);
   }
-  const bool first = service->handles == 0;
-  if (first) service->pace = pace;
-  if (first || service->is_refused()) {
-    const nif_status status = ask(service, service->pace, nif_timeout(timeout));
-    if (status != NIF_OK) {
-      auto failure = failure_of(status, "subscribe " + full_name);
-      if (first) give_up(service);
-      return failure;
-    }
+  if (status != NIF_OK) {
+    auto failure = failure_of(status, "subscribe " + full_name);
+    service->remove(*reading.reader);
+    // As before: the hub does not know this one.
+    if (service->followed && is_first) static_cast<void>(ask(service, kNoWait));
+    forget_unused(service);
+    return failure;
   }
-  ++service->handles;
   // It may have been subscribed before, to know where it is or when it was another one.
-  if (!service->accepts()) return service;
-  leave(service);
+  if (!service->accepts()) return reading;
+  leave(reading);
   return Failure{Status::not_found, "cannot subscribe to '" + full_name +
                                         "': it takes data and gives none; send to it"};
 }
 
-void ServiceTable::unsubscribe(const Subscribed& service) {
+void ServiceTable::unsubscribe(const Reading& reading) {
   const MutexLock turn(asking_);
-  leave(service);
+  leave(reading);
 }
 
-void ServiceTable::leave(const Subscribed& service) {
-  if (--service->handles != 0) return;
-  stop_reading(*service);
+void ServiceTable::leave(const Reading& reading) {
+  const Subscribed& service = reading.service;
+  const Share before = service->share();
+  service->remove(*reading.reader);
   // If the hub is not told in time, because of a break, NIF tells it with the next connection.
-  if (service->followed) {
-    const Asking asking(*this);                            // for what is told behind the answer
-    static_cast<void>(ask(service, {}, kLeaveTimeoutMs));  // without a pace
+  if (service->is_read() || service->followed) {
+    if (service->share() == before) return;
+    const Asking asking(*this);  // for what is told behind the answer
+    static_cast<void>(ask(service, Timeout{kLeaveTimeoutMs}));
     return;
   }
   static_cast<void>(nif_unsubscribe(uplink_.node(), service->name().c_str(), kLeaveTimeoutMs));
   forget_unused(service);
 }
 
-/// It could not be subscribed.
-void ServiceTable::give_up(const Subscribed& service) {
-  stop_reading(*service);
-  if (service->followed) static_cast<void>(ask(service, {}, 0));  // as before: without a pace
-  forget_unused(service);
-}
-
-void ServiceTable::stop_reading(SubscribedService& service) {
-  {
-    const MutexLock lock(mutex_);
-    service.read = false;
-  }
-  inbox_.close(service.queue());
-}
-
 void ServiceTable::forget_unused(const Subscribed& service) {
-  if (service->handles != 0 || service->followed) return;
+  if (service->is_read() || service->followed) return;
   const MutexLock lock(mutex_);
   end_groups(*service);
   subscribed_.erase(service->name());
@@ -260,16 +243,10 @@ Outcome<ServiceTable::Stream> ServiceTable::follow(const std::string& full_name,
                                                    const MakeStream& make) {
   const MutexLock turn(asking_);
   const Asking asking(*this);
-  Subscribed service;
-  {
-    const MutexLock lock(mutex_);
-    service = entry(full_name, {1, AtFullQueue::overwrite_oldest});
-  }
-  const bool read = service->handles != 0;
+  const Subscribed service = entry(full_name);
   // Also one that is read: what the hub told of it last may still be under way.
   if (!service->followed || service->is_refused()) {
-    const nif_status status =
-        ask(service, read ? service->pace : PaceOptions{}, nif_timeout(timeout));
+    const nif_status status = ask(service, timeout);
     if (status != NIF_OK) {
       auto failure = failure_of(status, "send to " + full_name);
       forget_unused(service);
@@ -296,7 +273,7 @@ void ServiceTable::unfollow(const std::string& full_name, const std::function<bo
     service = known->second;
   }
   service->followed = false;
-  if (service->handles != 0) return;
+  if (service->is_read()) return;
   // If the hub is not told in time, NIF tells it with the next connection.
   static_cast<void>(nif_unsubscribe(uplink_.node(), full_name.c_str(), kLeaveTimeoutMs));
   forget_unused(service);
@@ -311,7 +288,7 @@ ServiceTable::Found ServiceTable::subscribed(std::uint32_t group) {
     return {ended ? Place::unwanted : Place::unknown, nullptr};
   }
   // Of a service that is only sent to nobody takes messages.
-  if (!place->second->read) return {Place::unwanted, nullptr};
+  if (!place->second->is_read()) return {Place::unwanted, nullptr};
   return {Place::found, place->second};
 }
 

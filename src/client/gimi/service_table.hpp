@@ -44,11 +44,15 @@ class ServiceTable {
   void withdraw_accepted(const std::string& name) GIMNET_EXCLUDES(asking_);
 
   using Subscribed = std::shared_ptr<SubscribedService>;
-  [[nodiscard]] Outcome<Subscribed> subscribe(const std::string& full_name,
-                                              const QueueOptions& options, const PaceOptions& pace,
-                                              Timeout timeout) GIMNET_EXCLUDES(asking_, mutex_);
-  /// A handle that subscribe() counted was dropped; with the last one the subscription ends.
-  void unsubscribe(const Subscribed& service) GIMNET_EXCLUDES(asking_, mutex_);
+  struct Reading {
+    Subscribed service;
+    SubscribedService::SharedReader reader;
+  };
+  [[nodiscard]] Outcome<Reading> subscribe(const std::string& full_name,
+                                           const SubscribeOptions& wish)
+      GIMNET_EXCLUDES(asking_, mutex_);
+  /// With the last reader of a service the subscription ends.
+  void unsubscribe(const Reading& reading) GIMNET_EXCLUDES(asking_, mutex_);
   /// Services that are subscribed or sent to now.
   [[nodiscard]] std::size_t subscriptions() GIMNET_EXCLUDES(mutex_) {
     const MutexLock lock(mutex_);
@@ -109,14 +113,11 @@ class ServiceTable {
   [[nodiscard]] Place unknown() const GIMNET_REQUIRES(mutex_) {
     return open_ != 0 ? Place::not_yet : Place::unknown;
   }
-  [[nodiscard]] Subscribed entry(const std::string& full_name, const QueueOptions& options)
-      GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] nif_status ask(const Subscribed& service, const PaceOptions& pace,
-                               std::int32_t timeout_ms) GIMNET_REQUIRES(asking_)
+  [[nodiscard]] Subscribed entry(const std::string& full_name) GIMNET_EXCLUDES(mutex_);
+  /// Asks the hub for what all readers want.
+  [[nodiscard]] nif_status ask(const Subscribed& service, Timeout timeout) GIMNET_REQUIRES(asking_)
       GIMNET_EXCLUDES(mutex_);
-  void leave(const Subscribed& service) GIMNET_REQUIRES(asking_) GIMNET_EXCLUDES(mutex_);
-  void give_up(const Subscribed& service) GIMNET_REQUIRES(asking_) GIMNET_EXCLUDES(mutex_);
-  void stop_reading(SubscribedService& service) GIMNET_EXCLUDES(mutex_);
+  void leave(const Reading& reading) GIMNET_REQUIRES(asking_) GIMNET_EXCLUDES(mutex_);
   /// Takes it out of the table, unless somebody reads it or sends there.
   void forget_unused(const Subscribed& service) GIMNET_REQUIRES(asking_) GIMNET_EXCLUDES(mutex_);
   void set_place(const Subscribed& subscribed, const ServicePlace& place) GIMNET_REQUIRES(mutex_);

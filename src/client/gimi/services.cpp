@@ -154,6 +154,59 @@ void PublishedService::end(const Ending& ending) {
   changed_.notify_all();
 }
 
+Share Reader::share() const {
+  // With one message in the queue and another one on its way the one in the queue never gets old.
+  constexpr std::uint32_t kNewestWindow = 2;
+  Share wanted{wish.window, std::max(1u, wish.depth), wish.rate_hz};
+  if (wish.newest_only && wanted.window == 0) wanted.window = kNewestWindow;
+  return wanted;
+}
+
+QueueOptions Reader::queue_options(bool latest) const {
+  if (wish.newest_only || (wish.queue == 0 && (latest || wish.rate_hz > 0.0)))
+    return {1, AtFullQueue::overwrite_oldest};
+  return {wish.queue, wish.at_full};
+}
+
+SubscribedService::SharedReader SubscribedService::add(const SubscribeOptions& wish) {
+  const MutexLock lock(mutex_);
+  auto reader = std::make_shared<Reader>(inbox_, wish, latest_);
+  reader->missed_before = missed_;
+  readers_.push_back(reader);
+  return reader;
+}
+
+void SubscribedService::remove(const Reader& reader) {
+  const MutexLock lock(mutex_);
+  std::erase_if(readers_, [&reader](const SharedReader& each) { return each.get() == &reader; });
+  if (readers_.empty()) last_ = counted_ = {};
+}
+
+bool SubscribedService::is_read() {
+  const MutexLock lock(mutex_);
+  return !readers_.empty();
+}
+
+Share SubscribedService::share() {
+  const MutexLock lock(mutex_);
+  std::optional<Share> widest;
+  for (const SharedReader& reader : readers_) {
+    const Share one = reader->share();
+    if (!widest) widest = one;
+    const bool unbound = one.window == 0 || widest->window == 0;
+    widest->window = unbound ? 0 : std::max(widest->window, one.window);
+    widest->depth = std::max(widest->depth, one.depth);
+    const bool unpaced = one.rate_hz == 0.0 || widest->rate_hz == 0.0;
+    widest->rate_hz = unpaced ? 0.0 : std::max(widest->rate_hz, one.rate_hz);
+  }
+  return widest.value_or(Share{});
+}
+
+std::uint64_t SubscribedService::missed(const Reader& reader) {
+  const MutexLock lock(mutex_);
+  return missed_ - reader.missed_before;
+}
+
 bool SubscribedService::exists() {
   const MutexLock lock(mutex_);
   return exists_;
@@ -179,18 +232,6 @@ Outcome<void> SubscribedService::wait_until_exists(Timeout timeout) {
   return {};
 }
 
-std::uint64_t SubscribedService::missed() {
-  const std::uint64_t overwritten = queue_.inbox().counts(queue_).overwritten;
-  const MutexLock lock(mutex_);
-  return missed_ + overwritten;
-}
-
-QueueOptions SubscribedService::queue_options() const {
-  QueueOptions options = chosen_queue;
-  if (options.messages == 0 && place.latest) options = {1, AtFullQueue::overwrite_oldest};
-  return options;
-}
-
 Outcome<void> SubscribedService::standing() {
   const MutexLock lock(mutex_);
   if (end_) return end_.failure("subscribe " + name_->text);
@@ -206,12 +247,6 @@ bool SubscribedService::is_refused() {
   return refusal_.has_value();
 }
 
-bool SubscribedService::is_repeated(const Position& message) {
-  const MutexLock lock(mutex_);
-  return message.sequence != 0 && message.from == last_.from && message.epoch == last_.epoch &&
-         message.sequence == last_.sequence;
-}
-
 SubscribedService::Stream* SubscribedService::find(const Position& message) {
   const auto found = std::ranges::find_if(streams_, [&message](const Stream& each) {
     return each.from == message.from && each.key == message.key;
@@ -225,8 +260,32 @@ StreamEpochs::Step SubscribedService::look(const Position& message) {
   return stream == nullptr ? StreamEpochs::Step::first : stream->epochs.look(message.epoch);
 }
 
-void SubscribedService::count_missed(const Position& message) {
+SubscribedService::Put SubscribedService::put(const std::optional<Position>& position,
+                                              Message& message) {
   const MutexLock lock(mutex_);
+  const bool repeated = position && position->sequence != 0 && *position == last_;
+  // After a break, and for a reader more, the hub gives the last message of a retained service
+  // again: it does not know who had it.
+  const auto wants = [repeated](const SharedReader& reader) { return !repeated || !reader->begun; };
+  const auto wanted = std::ranges::count_if(readers_, wants);
+  if (wanted == 0) return Put::unwanted;
+  if (position && !repeated) count_missed(*position);
+  bool kept = false;
+  if (wanted == 1) {
+    kept = inbox_.put((*std::ranges::find_if(readers_, wants))->queue, message, nullptr);
+  } else {
+    std::vector<MessageQueue*> queues;
+    for (const SharedReader& reader : readers_)
+      if (wants(reader)) queues.push_back(&reader->queue);
+    kept = inbox_.put_in_all(queues, message);
+  }
+  if (!kept) return Put::no_room;
+  for (const SharedReader& reader : readers_) reader->begun = true;
+  if (position) take(*position);
+  return Put::kept;
+}
+
+void SubscribedService::count_missed(const Position& message) {
   if (message == counted_) return;  // it found no room the last time
   counted_ = message;
   const auto step = static_cast<std::int32_t>(message.sequence - last_.sequence);
@@ -235,8 +294,7 @@ void SubscribedService::count_missed(const Position& message) {
     missed_ += static_cast<std::uint32_t>(step - 1);
 }
 
-void SubscribedService::on_message(const Position& message) {
-  const MutexLock lock(mutex_);
+void SubscribedService::take(const Position& message) {
   last_ = message;
   Stream* stream = find(message);
   if (stream == nullptr) {
@@ -250,6 +308,10 @@ void SubscribedService::on_place(const ServicePlace& now) {
   const MutexLock lock(mutex_);
   exists_ = now.destination() != 0 && !now.accepts;
   accepts_ = now.destination() != 0 && now.accepts;
+  if (now.group != 0 && std::exchange(latest_, now.latest) != now.latest) {
+    for (const SharedReader& reader : readers_)
+      inbox_.set(reader->queue, reader->queue_options(latest_));
+  }
   refusal_.reset();
   changed_.notify_all();
 }

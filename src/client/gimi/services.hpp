@@ -83,26 +83,64 @@ class PublishedService {
   Ending end_ GIMNET_GUARDED_BY(mutex_);
 };
 
-/// A service of another node that this one subscribed, to read it or to know where it is, and the
-/// queue of its messages. Thread safety: any thread. Lifetime: the inbox outlives it.
+/// What the hub is asked for of a service.
+struct Share {
+  std::uint32_t window = 0;  ///< 0: as the service has it
+  std::uint32_t depth = 1;
+  double rate_hz = 0.0;  ///< 0: no bound
+  friend bool operator==(const Share&, const Share&) = default;
+};
+
+/// One subscribe() of a program: what it wants, and the queue of its messages. Lifetime: the inbox
+/// outlives it.
+struct Reader {
+  Reader(Inbox& inbox, const SubscribeOptions& options, bool latest)
+      : wish(options), queue(inbox.add_queue(queue_options(latest))) {}
+  ~Reader() { queue.inbox().remove(queue); }
+  Reader(const Reader&) = delete;
+  Reader& operator=(const Reader&) = delete;
+
+  [[nodiscard]] Share share() const;
+  /// `latest`: of a service with that delivery.
+  [[nodiscard]] QueueOptions queue_options(bool latest) const;
+
+  const SubscribeOptions wish;
+  MessageQueue& queue;
+  /// What the service had missed when it began; guarded by the service's mutex, as the next one.
+  std::uint64_t missed_before = 0;
+  bool begun = false;  ///< a message came for it
+};
+
+/// A service of another node that this one subscribed, to read it or to know where it is. Thread
+/// safety: any thread.
 class SubscribedService {
  public:
-  SubscribedService(std::string full_name, Inbox& inbox, const QueueOptions& options)
-      : name_(new ServiceName(std::move(full_name))), queue_(inbox.add_queue(options)) {}
-  ~SubscribedService() { queue_.inbox().remove(queue_); }
-  SubscribedService(const SubscribedService&) = delete;
-  SubscribedService& operator=(const SubscribedService&) = delete;
+  SubscribedService(std::string full_name, Inbox& inbox)
+      : name_(new ServiceName(std::move(full_name))), inbox_(inbox) {}
 
   [[nodiscard]] ServiceName& shared_name() const { return *name_; }
   [[nodiscard]] const std::string& name() const { return name_->text; }
-  [[nodiscard]] MessageQueue& queue() const { return queue_; }
+
+  // ---- who reads it
+
+  using SharedReader = std::shared_ptr<Reader>;
+  /// Messages come into its queue from now on.
+  [[nodiscard]] SharedReader add(const SubscribeOptions& wish) GIMNET_EXCLUDES(mutex_);
+  /// Nothing comes into its queue any more.
+  void remove(const Reader& reader) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] bool is_read() GIMNET_EXCLUDES(mutex_);
+  /// As much as the reader wants that wants most.
+  [[nodiscard]] Share share() GIMNET_EXCLUDES(mutex_);
+  /// Messages that did not come for it, by their sequence.
+  [[nodiscard]] std::uint64_t missed(const Reader& reader) GIMNET_EXCLUDES(mutex_);
+
+  // ---- where it is
 
   /// There is a provider.
   [[nodiscard]] bool exists() GIMNET_EXCLUDES(mutex_);
   /// There is one who takes data under that name: nothing will come.
   [[nodiscard]] bool accepts() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] Outcome<void> wait_until_exists(Timeout timeout) GIMNET_EXCLUDES(mutex_);
-  [[nodiscard]] std::uint64_t missed() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] Outcome<void> standing() GIMNET_EXCLUDES(mutex_);
   /// The hub did not take the subscription again, and was not asked since.
   [[nodiscard]] bool is_refused() GIMNET_EXCLUDES(mutex_);
@@ -115,32 +153,24 @@ class SubscribedService {
     std::uint32_t sequence = 0;
     friend bool operator==(const Position&, const Position&) = default;
   };
-  /// The message that came last comes once more.
-  [[nodiscard]] bool is_repeated(const Position& message) GIMNET_EXCLUDES(mutex_);
   /// What a message would be. Changes nothing.
   [[nodiscard]] StreamEpochs::Step look(const Position& message) GIMNET_EXCLUDES(mutex_);
-  /// One of its messages is about to be put into the queue: whoever takes it knows what is missing
-  /// before it.
-  void count_missed(const Position& message) GIMNET_EXCLUDES(mutex_);
-  /// One of its messages is in the queue. REQUIRES: look() is not `former`.
-  void on_message(const Position& message) GIMNET_EXCLUDES(mutex_);
+  /// Puts one of its messages into the queues of all readers. The message that came last may come
+  /// once more, with what is retained: it goes to readers of which nothing came yet. `unwanted`:
+  /// nobody takes it; `no_room`: a queue refuses it, and it is in none. Without a position: it has
+  /// no GIMI header. REQUIRES: look() is not `former`.
+  enum class Put : std::uint8_t { kept, unwanted, no_room };
+  [[nodiscard]] Put put(const std::optional<Position>& position, Message& message)
+      GIMNET_EXCLUDES(mutex_);
   void on_place(const ServicePlace& now) GIMNET_EXCLUDES(mutex_);
   /// The hub did not take the subscription again; until on_place().
   void on_refused(Failure refusal) GIMNET_EXCLUDES(mutex_);
   void end(const Ending& ending) GIMNET_EXCLUDES(mutex_);
 
-  /// Handles of the program that read it; guarded by the table's asking mutex.
-  std::size_t handles = 0;
-  /// What those asked the hub for; guarded by the table's asking mutex.
-  PaceOptions pace;
-  /// The queue that the program asked for last; guarded by the table's mutex.
-  QueueOptions chosen_queue;
-  /// What that is of the service as it is now. REQUIRES: the table's mutex.
-  [[nodiscard]] QueueOptions queue_options() const;
+  /// The hub keeps its last message, as it answered last; guarded by the table's asking mutex.
+  bool retained = false;
   /// A stream of this node leads there; guarded by the table's asking mutex.
   bool followed = false;
-  /// What comes is for a queue of the program; guarded by the table's mutex.
-  bool read = false;
   /// Where it is; guarded by the table's mutex.
   ServicePlace place;
   /// Group ids that lead to it, the youngest last; guarded by the table's mutex.
@@ -155,12 +185,19 @@ class SubscribedService {
     StreamEpochs epochs;
   };
   [[nodiscard]] Stream* find(const Position& message) GIMNET_REQUIRES(mutex_);
+  /// One of its messages is about to be put into queues: whoever takes it knows what is missing
+  /// before it.
+  void count_missed(const Position& message) GIMNET_REQUIRES(mutex_);
+  /// One of its messages is in a queue.
+  void take(const Position& message) GIMNET_REQUIRES(mutex_);
 
   const OwnedServiceName name_;
-  MessageQueue& queue_;
+  Inbox& inbox_;
 
   Mutex mutex_;
   Condition changed_;
+  std::vector<SharedReader> readers_ GIMNET_GUARDED_BY(mutex_);
+  bool latest_ GIMNET_GUARDED_BY(mutex_) = false;  ///< its delivery
   bool exists_ GIMNET_GUARDED_BY(mutex_) = false;
   bool accepts_ GIMNET_GUARDED_BY(mutex_) = false;
   std::optional<Failure> refusal_ GIMNET_GUARDED_BY(mutex_);

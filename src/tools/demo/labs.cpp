@@ -117,7 +117,7 @@ class Camera {
     };
     if (!becomes(kReady_ns, known)) return Error{"camera/eye is not known at the other hub"};
     for (std::size_t viewer = 1; viewer < nodes_.size(); ++viewer) {
-      Outcome<Subscription> pictures = nodes_[viewer].subscribe("camera/eye", QueueOptions{1'024});
+      Outcome<Subscription> pictures = nodes_[viewer].subscribe("camera/eye", {.queue = 1'024});
       if (!pictures) return Error{pictures.failure().sentence};
       viewers_.push_back({std::move(*pictures), 0});
     }

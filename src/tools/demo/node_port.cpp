@@ -35,7 +35,7 @@ MessageKey key_of(Service service) { return {static_cast<std::uint32_t>(service)
 
 // Nothing overwritten: when the queue is full the node stops reading, and the hub counts what it
 // drops.
-QueueOptions lossless() { return {kQueueMessages, AtFullQueue::stop_reading}; }
+constexpr AtFullQueue kLossless = AtFullQueue::stop_reading;
 
 // For good: everything that trying again cannot heal.
 bool is_final(const Failure& failure) {
@@ -104,7 +104,7 @@ class RobotPort final : public GimiPort {
     }
     AcceptOptions options;
     options.key = key_of(Service::kDrive);
-    options.queue = lossless();
+    options.queue = {kQueueMessages, kLossless};
     options.metadata = "wanted speed, Bitestream";
     Outcome<Queue> queue = node().accept(kDriveName, options);
     if (!queue) return Error{queue.failure().sentence};
@@ -140,8 +140,8 @@ class ViewerPort final : public GimiPort {
 
   std::optional<Error> open() {
     for (const ServiceInfo& info : kProvided) {
-      Outcome<Subscription> subscription =
-          node().subscribe(fmt::format("{}/{}", robot_, info.name), lossless());
+      Outcome<Subscription> subscription = node().subscribe(
+          fmt::format("{}/{}", robot_, info.name), {.queue = kQueueMessages, .at_full = kLossless});
       if (!subscription) return Error{subscription.failure().sentence};
       subscriptions_.push_back(std::move(*subscription));
     }

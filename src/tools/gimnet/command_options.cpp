@@ -174,14 +174,14 @@ void add_echo(CLI::App& app, ToolOptions& options) {
                   "full name, node/service, or a pattern: `*` one part, `**` any number")
       ->required()
       ->check(not_empty());
-  echo.add_option("--window", options.pace.window,
-                  "of delivery sync:N: fewer than N untaken messages, from 1")
+  echo.add_option("--window", options.wish.window,
+                  "untaken messages at most, from 1; of delivery sync:N fewer than N")
       ->transform(within(std::uint32_t{1}, kSyncWindowMax));
   echo.add_option(
-          "--depth", options.pace.depth,
+          "--depth", options.wish.depth,
           "newest messages that the hub holds meanwhile, 1 to 4096, of most hubs to 64, default 1")
       ->transform(within(std::uint32_t{1}, kDepthMax));
-  echo.add_option("--rate", options.pace.rate_hz,
+  echo.add_option("--rate", options.wish.rate_hz,
                   "messages a second at most, 0.001 to 1000, default all")
       ->transform(within(0.001, 1e3));
   add_printing(echo, options);

@@ -76,7 +76,7 @@ struct ToolOptions {
   bool stay = false;
   std::string text;  ///< of a request
   bool echo_back = false;
-  PaceOptions pace;  ///< of what is subscribed
+  SubscribeOptions wish;  ///< of what is subscribed
   Lane lane = Lane::normal;
   MessageKey key;
   CtlOptions ctl;

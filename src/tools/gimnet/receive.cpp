@@ -124,10 +124,12 @@ ExitCode run_recv(ToolSession& session) {
 
 ExitCode run_echo(ToolSession& session) {
   if (const auto ending = session.join({})) return *ending;
-  Subscriptions subscriptions(session.node(), session.options().target, kFreshMessages,
-                              session.options().pace);
+  // As many wait as the library chooses: of a service with delivery `latest` only the newest.
+  SubscribeOptions wish = session.options().wish;
+  wish.at_full = AtFullQueue::stop_reading;
+  Subscriptions subscriptions(session.node(), session.options().target, wish);
   // A user that asks for less than all has gaps on purpose.
-  const bool all = !wants_less(session.options().pace);
+  const bool all = !wants_less(wish);
   if (const auto opened = subscriptions.open(); !opened) return session.fail(opened.failure());
   if (const std::string words = subscriptions.waits_for(); !words.empty()) say(words);
   MissedMessages missed(

@@ -125,10 +125,10 @@ ServiceFollower::~ServiceFollower() {
 }
 
 Outcome<void> ServiceFollower::open() {
-  auto watch = node_.watch(pattern_, {.nodes = false, .services = true}, kSubscribe);
+  auto watch = node_.watch(pattern_, {.nodes = false, .services = true}, wish_.timeout);
   if (!watch) return watch.failure();
   watch_ = std::move(*watch);
-  const std::int64_t end_ns = steady_now_ns() + std::chrono::nanoseconds(kSubscribe).count();
+  const std::int64_t end_ns = steady_now_ns() + std::chrono::nanoseconds(wish_.timeout).count();
   for (bool complete = false; !complete;) {
     const std::int64_t left_ns = std::max<std::int64_t>(end_ns - steady_now_ns(), 0);
     const auto event = watch_->receive(Timeout{left_ns / 1'000'000});
@@ -138,7 +138,7 @@ Outcome<void> ServiceFollower::open() {
   }
   // Whether the hub takes the terms shows at the first; as long as messages of it wait here, others
   // may wait, too.
-  if (auto done = subscribe_next(kSubscribe); !done) return done;
+  if (auto done = subscribe_next(wish_.timeout); !done) return done;
   thread_ = std::thread([this] { run(); });
   return {};
 }
@@ -187,7 +187,9 @@ Outcome<void> ServiceFollower::subscribe_next(Timeout timeout) {
     if (const std::string* wanted = matching_.wanted()) name = *wanted;
   }
   if (!name.empty()) {
-    auto subscription = node_.subscribe(name, queue_, timeout, pace_);
+    SubscribeOptions wish = wish_;
+    wish.timeout = timeout;
+    auto subscription = node_.subscribe(name, wish);
     if (!subscription) return subscription.failure();
     told_ = false;
     const MutexLock lock(mutex_);

@@ -111,11 +111,7 @@ class VanishedServices {
 };
 
 /// So many messages of one service wait in this process; then it stops reading from the hub.
-inline constexpr QueueOptions kAllMessages{4096, AtFullQueue::stop_reading};
-/// As the library chooses: of a service with delivery `latest` only the newest message waits.
-inline constexpr QueueOptions kFreshMessages{0, AtFullQueue::stop_reading};
-/// The longest time of subscribing.
-inline constexpr Timeout kSubscribe{5'000};
+inline constexpr SubscribeOptions kAllMessages{.queue = 4096, .at_full = AtFullQueue::stop_reading};
 
 /// Subscribes to all services that match a pattern, to those that come later as soon as the hub
 /// tells of them. It has a thread of its own for that, since whoever waits for messages cannot wait
@@ -124,9 +120,8 @@ inline constexpr Timeout kSubscribe{5'000};
 class ServiceFollower {
  public:
   /// `node` must outlive it, and is closed with it.
-  ServiceFollower(Node& node, std::string pattern, const QueueOptions& queue,
-                  const PaceOptions& pace)
-      : node_(node), pattern_(std::move(pattern)), queue_(queue), pace_(pace) {}
+  ServiceFollower(Node& node, std::string pattern, const SubscribeOptions& wish)
+      : node_(node), pattern_(std::move(pattern)), wish_(wish) {}
   ~ServiceFollower();
   ServiceFollower(const ServiceFollower&) = delete;
   ServiceFollower& operator=(const ServiceFollower&) = delete;
@@ -168,8 +163,7 @@ class ServiceFollower {
 
   Node& node_;
   const std::string pattern_;
-  const QueueOptions queue_;
-  const PaceOptions pace_;
+  const SubscribeOptions wish_;
   std::optional<Watch> watch_;  ///< open()'s, then the thread's
   std::int64_t retry_ns_ = 0;   ///< not earlier is asked again; the thread's, as the next two
   std::int64_t tidy_ns_ = 0;    ///< not earlier is let go again

@@ -8,27 +8,26 @@
 
 namespace gimnet::tool {
 
-bool wants_less(const PaceOptions& pace) {
-  return pace.window != 0 || pace.depth != PaceOptions{}.depth || pace.rate_hz > 0.0;
+bool wants_less(const SubscribeOptions& wish) {
+  return wish.window != 0 || wish.depth > 1 || wish.rate_hz > 0.0;
 }
 
 Outcome<void> Subscriptions::open() {
   if (!is_pattern(word_)) {
-    auto subscription = node_.subscribe(word_, queue_, kSubscribe, pace_);
+    auto subscription = node_.subscribe(word_, wish_);
     if (!subscription) return subscription.failure();
     one_ = std::move(*subscription);
     return {};
   }
-  follower_.emplace(node_, word_, queue_, pace_);
+  follower_.emplace(node_, word_, wish_);
   if (auto done = follower_->open(); !done) return done;
-  return !follower_->any() && wants_less(pace_) ? ask_terms() : Outcome<void>{};
+  return !follower_->any() && wants_less(wish_) ? ask_terms() : Outcome<void>{};
 }
 
 /// Whether the hub takes the pace, before there is a service to which it could say no: by a
 /// subscription that ends at once, of a service that nobody has.
 Outcome<void> Subscriptions::ask_terms() {
-  auto subscription =
-      node_.subscribe("gimnet-echo/terms", {1, AtFullQueue::stop_reading}, kSubscribe, pace_);
+  const auto subscription = node_.subscribe("gimnet-echo/terms", wish_);
   return subscription ? Outcome<void>{} : subscription.failure();
 }
 

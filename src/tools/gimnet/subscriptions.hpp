@@ -12,16 +12,15 @@
 namespace gimnet::tool {
 
 /// Not all messages are wanted, and the hub has to take the terms.
-[[nodiscard]] bool wants_less(const PaceOptions& pace);
+[[nodiscard]] bool wants_less(const SubscribeOptions& wish);
 
 /// The services that a word of the command line names: one by its full name, which need not exist
 /// yet, or all that match a pattern, those that come later too. Thread safety: one thread.
 class Subscriptions {
  public:
   /// `node` must outlive it; with a pattern it is closed with it.
-  Subscriptions(Node& node, std::string word, const QueueOptions& queue,
-                const PaceOptions& pace = {})
-      : node_(node), word_(std::move(word)), queue_(queue), pace_(pace) {}
+  Subscriptions(Node& node, std::string word, const SubscribeOptions& wish)
+      : node_(node), word_(std::move(word)), wish_(wish) {}
 
   /// Subscribes to what is there; of a pattern to the first, and to the others meanwhile. Errors:
   /// as Node::subscribe() and Node::watch().
@@ -46,8 +45,7 @@ class Subscriptions {
 
   Node& node_;
   std::string word_;
-  QueueOptions queue_;
-  PaceOptions pace_;
+  SubscribeOptions wish_;
   std::optional<Subscription> one_;          ///< by its full name
   std::optional<ServiceFollower> follower_;  ///< of a pattern
 };

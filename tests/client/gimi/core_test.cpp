@@ -88,7 +88,7 @@ TEST_P(Dismissed, EverybodyWhoWaitsLeavesWithTheReason) {
       [&] { EXPECT_FALSE(node_->ping(Peer{kPeerId}, kForever)); },
       [&] { told(node_->find("anybody", kForever).failure()); },
       [&] { told(node_->watch("**", {}, kForever).failure()); },
-      [&] { told(node_->subscribe("a/b", {}, kForever).failure()); },
+      [&] { told(node_->subscribe("a/b", {.timeout = kForever}).failure()); },
   };
   std::vector<std::thread> waiting;
   for (const auto& call : calls) waiting.emplace_back(call);

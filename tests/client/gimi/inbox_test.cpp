@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <atomic>
 #include <string>
 #include <thread>
@@ -72,17 +73,42 @@ TEST_F(InboxTest, AQueueThatNobodyReadsAnyMoreHoldsNobodyUp) {
   Message second = make_message("x", 2);
   EXPECT_TRUE(inbox_.put(queue, first, nullptr));
   EXPECT_FALSE(inbox_.put(queue, second, nullptr));
-  inbox_.close(queue);
-  EXPECT_EQ(rooms_, 1);
-  EXPECT_TRUE(inbox_.put(queue, second, nullptr));
-  EXPECT_TRUE(inbox_.receive_any(kNoWait).is(Status::timeout))
-      << "what waited and what came is dropped";
-  inbox_.set(queue, options);
-  Message third = make_message("x", 3);
-  EXPECT_TRUE(inbox_.put(queue, third, nullptr));
-  EXPECT_EQ(inbox_.try_receive(queue)->sequence(), 3u);
   inbox_.remove(queue);
+  EXPECT_EQ(rooms_, 1);
   EXPECT_EQ(inbox_.queues(), 0u);
+  EXPECT_TRUE(inbox_.receive_any(kNoWait).is(Status::timeout)) << "what waited is dropped";
+}
+
+TEST(Inbox, CountsWhatWaitsInAQueueThatGoesAsTaken) {
+  std::uint32_t taken = 0;
+  Inbox inbox(2, 1000, [] {}, [&taken](const TakenMessages& some, bool) { taken += some.count; });
+  MessageQueue& queue = inbox.add_queue({});
+  Message message = make_counted(11, 1);
+  EXPECT_TRUE(inbox.put(queue, message, nullptr));
+  EXPECT_EQ(taken, 0u);
+  inbox.remove(queue);
+  EXPECT_EQ(taken, 1u);
+}
+
+TEST(Inbox, PutsAMessageIntoAllQueuesOrNone) {
+  std::uint32_t taken = 0;
+  Inbox inbox(2, 1000, [] {}, [&taken](const TakenMessages& some, bool) { taken += some.count; });
+  MessageQueue& one = inbox.add_queue({4, AtFullQueue::stop_reading});
+  MessageQueue& other = inbox.add_queue({1, AtFullQueue::stop_reading});
+  const std::array queues{&one, &other};
+  Message message = make_counted(11, 1);
+  EXPECT_TRUE(inbox.put_in_all(queues, message));
+  EXPECT_EQ(taken, 1u) << "once, when it is in all";
+  Message next = make_message("text", 2);
+  EXPECT_FALSE(inbox.put_in_all(queues, next)) << "there is no room in one of them";
+  EXPECT_EQ(next.text(), "text");
+  EXPECT_EQ(inbox.counts(one).size, 1u);
+  EXPECT_TRUE(inbox.try_receive(other));
+  EXPECT_TRUE(inbox.put_in_all(queues, next));
+  EXPECT_TRUE(inbox.try_receive(one));
+  EXPECT_EQ(inbox.try_receive(one)->text(), "text");
+  EXPECT_EQ(inbox.try_receive(other)->text(), "text");
+  EXPECT_EQ(taken, 1u);
 }
 
 TEST_F(InboxTest, ClosingEndsAllWaits) {

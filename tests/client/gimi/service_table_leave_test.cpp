@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include "client/gimi/service_table.hpp"
 #include "proto/control/ns.hpp"
@@ -40,18 +41,25 @@ class LeftSubscriptions : public testing::Test {
                                     ? proto::encode_answer(answer, number)
                                     : proto::encode_refusal(header, {status, "no"}));
   }
-  ServiceTable::Subscribed subscribe(const std::string& name = kName) {
-    ServiceTable::Subscribed made;
-    PaceOptions pace;
-    pace.window = 2;
-    std::thread asking([&] { made = table_.subscribe(name, {}, pace, kForever).or_throw(); });
-    answer_subscribe(2);
+  ServiceTable::Reading subscribe(const std::string& name = kName) {
+    return subscribe(name, {.timeout = kForever, .window = 2}, 2);
+  }
+  ServiceTable::Reading subscribe(const std::string& name, const SubscribeOptions& wish,
+                                  std::uint32_t window) {
+    ServiceTable::Reading made;
+    std::thread asking([&] { made = table_.subscribe(name, wish).or_throw(); });
+    answer_subscribe(window);
     asking.join();
     return made;
   }
+  void leave_with_an_answer(ServiceTable::Reading reading, std::uint32_t window) {
+    std::thread leaving([&] { table_.unsubscribe(reading); });
+    answer_subscribe(window);
+    leaving.join();
+  }
   /// The last handle of the name.
-  void leave(ServiceTable::Subscribed service) {
-    std::thread leaving([&] { table_.unsubscribe(std::move(service)); });
+  void leave(ServiceTable::Reading reading) {
+    std::thread leaving([&] { table_.unsubscribe(reading); });
     std::uint16_t number = 0;
     ASSERT_TRUE(connected_.hub.next_request<ns::Unsubscribe>(number));
     connected_.hub.send_control(proto::Kind::ns,
@@ -81,29 +89,44 @@ class LeftSubscriptions : public testing::Test {
 
 TEST_F(LeftSubscriptions, NothingOfAsManyNamesAsAProgramLikes) {
   for (int i = 0; i < 100; ++i) {
-    ServiceTable::Subscribed service = subscribe("robot/s" + std::to_string(i));
+    ServiceTable::Reading reading = subscribe("robot/s" + std::to_string(i));
     EXPECT_EQ(table_.subscriptions(), 1u);
     EXPECT_EQ(inbox_.queues(), 1u);
-    leave(std::move(service));
+    leave(std::move(reading));
     EXPECT_EQ(table_.subscriptions(), 0u);
     EXPECT_EQ(inbox_.queues(), 0u);
   }
 }
 
-TEST_F(LeftSubscriptions, AllAsLongAsThereIsAHandle) {
-  ServiceTable::Subscribed first = subscribe();
-  ServiceTable::Subscribed second = table_.subscribe(kName, {}, {}, kForever).or_throw();
-  table_.unsubscribe(std::move(first));
+TEST_F(LeftSubscriptions, AllAsLongAsThereIsAReader) {
+  ServiceTable::Reading first = subscribe();
+  ServiceTable::Reading second = subscribe();
+  table_.unsubscribe(std::exchange(first, {}));
   EXPECT_EQ(table_.subscriptions(), 1u);
-  EXPECT_EQ(table_.subscribed(kGroup).service, second);
+  EXPECT_EQ(inbox_.queues(), 1u);
+  EXPECT_EQ(table_.subscribed(kGroup).service, second.service);
   leave(std::move(second));
   EXPECT_EQ(table_.subscriptions(), 0u);
   EXPECT_EQ(table_.subscribed(kGroup).place, ServiceTable::Place::unwanted)
       << "what is still on its way is no loss";
 }
 
+TEST_F(LeftSubscriptions, NoMoreThanTheOthersWant) {
+  ServiceTable::Reading narrow = subscribe();
+  ServiceTable::Reading wide = subscribe(kName, {.timeout = kForever, .window = 7}, 7);
+  ServiceTable::Reading all = subscribe(kName, {.timeout = kForever}, 0);
+  leave_with_an_answer(std::move(all), 7);
+  leave_with_an_answer(std::move(wide), 2);
+  leave(std::move(narrow));
+}
+
+TEST_F(LeftSubscriptions, OnesThatWantTheNewestOnlyHaveAWindowOfTwo) {
+  leave(subscribe(kName, {.newest_only = true, .timeout = kForever}, 2));
+  leave(subscribe(kName, {.newest_only = true, .timeout = kForever, .window = 5}, 5));
+}
+
 TEST_F(LeftSubscriptions, NothingOfOneThatTheHubRefused) {
-  std::thread asking([&] { EXPECT_FALSE(table_.subscribe(kName, {}, {}, kForever)); });
+  std::thread asking([&] { EXPECT_FALSE(table_.subscribe(kName, {.timeout = kForever})); });
   answer_subscribe(0, proto::Status::limit);
   asking.join();
   EXPECT_EQ(table_.subscriptions(), 0u);
@@ -111,34 +134,28 @@ TEST_F(LeftSubscriptions, NothingOfOneThatTheHubRefused) {
 }
 
 // The library's thread has found where a message belongs, and the program leaves.
-TEST_F(LeftSubscriptions, AMessageThatIsJustComingHasAQueueStillAndIsDropped) {
-  ServiceTable::Subscribed service = subscribe();
-  ServiceTable::Subscribed found = table_.subscribed(kGroup).service;
-  leave(std::move(service));
-  EXPECT_EQ(table_.subscriptions(), 0u);
+TEST_F(LeftSubscriptions, NobodyWhoTakesAMessageThatIsJustComing) {
+  ServiceTable::Reading reading = subscribe();
+  const ServiceTable::Subscribed found = table_.subscribed(kGroup).service;
+  leave(std::move(reading));
   Message message = test::make_message("x");
-  EXPECT_TRUE(inbox_.put(found->queue(), message, nullptr));
-  EXPECT_FALSE(inbox_.try_receive(found->queue()));
-  EXPECT_EQ(inbox_.queues(), 1u);
-  found.reset();
-  EXPECT_EQ(inbox_.queues(), 0u);
+  EXPECT_EQ(found->put({}, message), SubscribedService::Put::unwanted);
+  EXPECT_EQ(message.text(), "x");
 }
 
 TEST_F(LeftSubscriptions, OneThatIsSentToIsFollowedWithoutAPace) {
-  ServiceTable::Subscribed service = subscribe();
+  ServiceTable::Reading reading = subscribe();
   follow();
-  std::thread leaving([&] { table_.unsubscribe(std::move(service)); });
-  answer_subscribe(0);
-  leaving.join();
+  leave_with_an_answer(std::move(reading), 0);
   EXPECT_EQ(table_.subscriptions(), 1u);
 }
 
 TEST_F(LeftSubscriptions, WhatEndedDuringABreakIsToldWithTheNextConnection) {
-  ServiceTable::Subscribed service = subscribe();
+  const ServiceTable::Reading reading = subscribe();
   follow();
   connected_.hub.close();
   while (nif::test::info_of(connected_.node.get()).connected != 0) std::this_thread::yield();
-  table_.unsubscribe(std::move(service));  // which gives up waiting
+  table_.unsubscribe(reading);  // which gives up waiting
   connected_.hub = hub_.admit(nif::test::make_welcome());
   answer_subscribe(0);
   EXPECT_EQ(table_.subscriptions(), 1u);

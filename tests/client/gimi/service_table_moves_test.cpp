@@ -346,11 +346,12 @@ TEST(ServiceTable, AMoveWaitsForTheServiceThatIsJustNotReadAnyMore) {
     connected.hub.send_control(proto::Kind::ns, proto::encode_answer(answer, number));
   };
   std::thread asking([&] {
-    auto service = table.subscribe("robot/odom", {}, {}, kForever).or_throw();
+    const auto reading =
+        table.subscribe("robot/odom", {.timeout = kForever, .window = 2}).or_throw();
     static_cast<void>(table.follow("robot/odom", kForever, [](const ServicePlace&) {
       return Outcome<ServiceTable::Stream>(Failure{Status::denied, "there is nothing to send"});
     }));
-    table.unsubscribe(std::move(service));
+    table.unsubscribe(reading);
   });
   answer_one(kFirst, [] {});
   nif_incoming moved{};

@@ -21,14 +21,13 @@ namespace ns = proto::ns;
 constexpr std::uint32_t kGroup = (7u << 20) | 11;
 constexpr const char* kName = "robot/odom";
 constexpr std::uint32_t kWindow = 2;
+constexpr SubscribeOptions kWish{.timeout = kForever, .window = kWindow};
 
 class RefusedSubscriptions : public testing::Test {
  protected:
   RefusedSubscriptions() {
     uplink_.open(connected_.node.get());
-    PaceOptions pace;
-    pace.window = kWindow;
-    std::thread asking([&] { first_ = table_.subscribe(kName, {}, pace, kForever).or_throw(); });
+    std::thread asking([&] { first_ = table_.subscribe(kName, kWish).or_throw(); });
     answer_subscribe(kWindow, proto::Status::done);
     asking.join();
     refuse();
@@ -59,7 +58,7 @@ class RefusedSubscriptions : public testing::Test {
     moved.payload = kWords.data();
     moved.size = kWords.size();
     EXPECT_EQ(table_.on_service_moved(moved), ServiceTable::Place::found);
-    EXPECT_TRUE(first_->standing().is(Status::limit));
+    EXPECT_TRUE(first_.service->standing().is(Status::limit));
     moves_.clear();
   }
 
@@ -72,35 +71,34 @@ class RefusedSubscriptions : public testing::Test {
   ServiceTable table_{uplink_, inbox_, [this](const std::string&, const ServicePlace& place) {
                         moves_.push_back(place.group);
                       }};
-  ServiceTable::Subscribed first_;
+  ServiceTable::Reading first_;
 };
 
-TEST_F(RefusedSubscriptions, AreAskedForWithTheNextHandleAsTheyWere) {
+TEST_F(RefusedSubscriptions, AreAskedForWithTheNextReader) {
   std::thread asking(
-      [&] { EXPECT_EQ(table_.subscribe(kName, {}, {}, kForever).or_throw(), first_); });
+      [&] { EXPECT_EQ(table_.subscribe(kName, kWish).or_throw().service, first_.service); });
   answer_subscribe(kWindow, proto::Status::done);
   asking.join();
-  EXPECT_TRUE(first_->standing());
-  EXPECT_EQ(table_.subscribed(kGroup).service, first_);
+  EXPECT_TRUE(first_.service->standing());
+  EXPECT_EQ(table_.subscribed(kGroup).service, first_.service);
   EXPECT_EQ(moves_, std::vector<std::uint32_t>{kGroup}) << "no other word of it comes";
-  EXPECT_TRUE(table_.subscribe(kName, {}, {}, kForever)) << "which asks no more";
 }
 
 TEST_F(RefusedSubscriptions, AreNoOthersWhereTheHubRefusesThemAgain) {
   std::thread asking([&] {
-    const auto again = table_.subscribe(kName, {}, {}, kForever);
+    const auto again = table_.subscribe(kName, kWish);
     ASSERT_TRUE(again.is(Status::limit));
     EXPECT_NE(again.failure().sentence.find("still no"), std::string::npos);
   });
   answer_subscribe(kWindow, proto::Status::limit);
   asking.join();
-  EXPECT_TRUE(first_->standing().is(Status::limit));
-  EXPECT_EQ(table_.subscriptions(), 1u) << "the first handle is there still";
+  EXPECT_TRUE(first_.service->standing().is(Status::limit));
+  EXPECT_EQ(table_.subscriptions(), 1u) << "the first reader is there still";
   EXPECT_TRUE(moves_.empty());
-  std::thread once_more([&] { EXPECT_TRUE(table_.subscribe(kName, {}, {}, kForever)); });
+  std::thread once_more([&] { EXPECT_TRUE(table_.subscribe(kName, kWish)); });
   answer_subscribe(kWindow, proto::Status::done);
   once_more.join();
-  EXPECT_TRUE(first_->standing());
+  EXPECT_TRUE(first_.service->standing());
 }
 
 TEST_F(RefusedSubscriptions, AreAskedForWhereTheyAreToBeSentTo) {
@@ -113,7 +111,7 @@ TEST_F(RefusedSubscriptions, AreAskedForWhereTheyAreToBeSentTo) {
   });
   answer_subscribe(kWindow, proto::Status::done);
   asking.join();
-  EXPECT_TRUE(first_->standing());
+  EXPECT_TRUE(first_.service->standing());
 }
 
 }  // namespace

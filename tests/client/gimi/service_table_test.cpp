@@ -54,7 +54,7 @@ TEST_F(Services, TheLatestWaitsAloneUnlessTheProgramChoseALength) {
   const Publisher images = robot.advertise("image", options).or_throw();
   const Subscription newest = viewer.subscribe("robot/image").or_throw();
   const Node archive = join();
-  const Subscription all = archive.subscribe("robot/image", {.messages = 64}).or_throw();
+  const Subscription all = archive.subscribe("robot/image", {.queue = 64}).or_throw();
   images.wait_for_subscribers(3, kWait).or_throw();
   // One at a time: what is under way the hub may replace, too.
   for (const std::string text : {"1", "2", "3"}) {
@@ -154,8 +154,7 @@ TEST_F(Services, ASubscriptionSurvivesItsProvider) {
 
 TEST_F(Services, WhatWasPublishedBeforeLeavingStillComes) {
   const Node viewer = join();
-  const Subscription odometry =
-      viewer.subscribe("robot/odom", {1000, AtFullQueue::overwrite_oldest}).or_throw();
+  const Subscription odometry = viewer.subscribe("robot/odom", {.queue = 1000}).or_throw();
   {
     const Node robot = join("robot");
     const Publisher publisher = robot.advertise("odom").or_throw();
@@ -172,7 +171,7 @@ TEST_F(Services, EndWithTheirLastHandle) {
   std::optional<Publisher> publisher = robot.advertise("odom").or_throw();
   std::optional<Publisher> copy(*publisher);
   std::optional<Subscription> subscription = viewer.subscribe("robot/odom").or_throw();
-  const std::optional<Subscription> same = viewer.subscribe("robot/odom").or_throw();
+  const Subscription other = viewer.subscribe("robot/odom").or_throw();
   publisher->wait_for_subscribers(1, kWait).or_throw();
   publisher.reset();
   subscription.reset();

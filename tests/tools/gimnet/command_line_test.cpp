@@ -58,9 +58,9 @@ TEST(CommandLine, ReadsEachCommand) {
   EXPECT_EQ(options({"pub", "a/b", "--delivery", "sync"}).window, 1u);
   const ToolOptions paced =
       options({"echo", "a/*", "--window", "2", "--depth", "4", "--rate", "0.5"});
-  EXPECT_EQ(paced.pace.window, 2u);
-  EXPECT_EQ(paced.pace.depth, 4u);
-  EXPECT_EQ(paced.pace.rate_hz, 0.5);
+  EXPECT_EQ(paced.wish.window, 2u);
+  EXPECT_EQ(paced.wish.depth, 4u);
+  EXPECT_EQ(paced.wish.rate_hz, 0.5);
   for (const char* wrong : {"sync:", "sync:0", "sync:x", "sync:2x", "fast"}) {
     EXPECT_NE(
         refusal({"pub", "a/b", "--delivery", wrong}).find("is no value for --delivery: stream"),
@@ -330,7 +330,7 @@ TEST(CommandLine, NumbersAreDecimal) {
 }
 
 TEST(CommandLine, RefusesWindowsThatNoHubTakes) {
-  EXPECT_EQ(options({"echo", "a/b", "--window", "1000000", "--depth", "4096"}).pace.depth, 4096u);
+  EXPECT_EQ(options({"echo", "a/b", "--window", "1000000", "--depth", "4096"}).wish.depth, 4096u);
   EXPECT_NE(refusal({"echo", "a/b", "--window", "0"}).find("is no value for --window"),
             std::string::npos);
   EXPECT_NE(refusal({"echo", "a/b", "--window", "1000001"}).find("is no value for --window"),
