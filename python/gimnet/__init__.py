@@ -18,11 +18,12 @@ from .errors import (BadArgument, BadName, BadVersion, Busy, Closed, Denied, Exp
 from .messages import Event, Message, NodeRecord, Peer, ServiceRecord
 from .node import Node, Publisher, Source, State, Watch, connect
 from .requests import Answers, Pending, Reply, Request
+from .wait_set import WaitSet
 
 __all__ = [
     "Answers", "BadArgument", "BadName", "BadVersion", "BitestreamError", "Busy", "Closed", "Denied", "Event", "Expired",
     "Failed", "Forked", "GimnetError", "Gone", "Limit", "Message", "NameTaken", "NoHost", "NoHub", "NoRight", "Node", "NodeRecord", "NotConnected",
     "NotDelivered", "NotFound", "NotRetained", "NotTrusted", "Peer", "Pending", "Protocol", "Publisher", "Refused", "Reply",
     "Request", "ServiceRecord",
-    "Source", "State", "System", "Taken", "Time", "Timeout", "TooLarge", "Watch", "WindowFull", "connect",
+    "Source", "State", "System", "Taken", "Time", "Timeout", "TooLarge", "WaitSet", "Watch", "WindowFull", "connect",
 ]

@@ -165,6 +165,10 @@ class gimi_request(ctypes.Structure):
                 ("content", c_uint32), ("storage", c_void_p), ("reserved", c_uint64 * 3)]
 
 
+class gimi_ready(ctypes.Structure):
+    _fields_ = [("member", c_uint64), ("user", c_uint64), ("reserved", c_uint64)]
+
+
 _HANDLE, _HANDLE_OUT = c_uint64, POINTER(c_uint64)
 # Those that answer a status, by their parameters.
 _STATUS_FUNCTIONS = {
@@ -195,6 +199,12 @@ _STATUS_FUNCTIONS = {
     "gimi_next_request": [_HANDLE, c_int32, POINTER(gimi_request)],
     "gimi_reply_to": [POINTER(gimi_request), c_void_p, c_size_t, c_int32],
     "gimi_fail_request": [POINTER(gimi_request), c_int32, c_char_p],
+    "gimi_wait_set_create": [_HANDLE_OUT],
+    "gimi_wait_set_add": [_HANDLE, _HANDLE, c_uint64],
+    "gimi_wait_set_remove": [_HANDLE, _HANDLE],
+    "gimi_wait_set_wait": [_HANDLE, POINTER(gimi_ready), c_uint32, c_size_t, c_int32, POINTER(c_size_t)],
+    "gimi_wait_set_wake": [_HANDLE],
+    "gimi_wait_set_descriptor": [_HANDLE, POINTER(c_int32)],
 }
 _OTHER_FUNCTIONS = {
     "gimi_id": (c_uint32, [_HANDLE]),

@@ -1,10 +1,11 @@
-"""Handles of the library, waiting for it, and the end of the program."""
+"""Handles of the library, waiting for them, and the end of the program."""
 
 from __future__ import annotations
 
 import atexit
 import ctypes
 import math
+import select
 import threading
 import time
 import weakref
@@ -12,7 +13,8 @@ from typing import Any, Callable, Generic, Iterator, Optional, Type, TypeVar
 
 from . import _c, errors
 
-# The library waits in pieces of that length, and Python looks for Ctrl-C between them.
+# Where there is no descriptor to wait for, the library waits in pieces of that length, and Python looks for
+# Ctrl-C between them.
 PIECE_MS = 50
 TIMEOUT_MS_MAX = (1 << 31) - 1
 Got = TypeVar("Got")
@@ -26,17 +28,30 @@ def to_ms(seconds: float) -> int:
     return max(1, round(seconds * 1000))
 
 
+def end_of(timeout: Optional[float]) -> float:
+    """The time at which a wait of so many seconds ends; None: never."""
+    if timeout is None:
+        return math.inf
+    if not timeout >= 0:
+        raise errors.BadArgument(f"a time of {timeout} s: use 0 or more, or None for no limit")
+    return time.monotonic() + timeout
+
+
+def left_ms(end: float, most: int) -> int:
+    """Milliseconds, not more than that; 0: the time is over."""
+    left = end - time.monotonic()
+    return most if left * 1000 >= most else max(0, math.ceil(left * 1000))
+
+
 def in_pieces(timeout: Optional[float], call: Callable[[int], Any], ended: Callable[[], bool] = lambda: False) -> int:
     """Calls with milliseconds until the status is not GIMI_TIMEOUT, or that is the end, or the seconds are
     over; None: no limit."""
     status = int(call(0))
     if status != _c.GIMI_TIMEOUT or ended():
         return status
-    if timeout is not None and not timeout >= 0:
-        raise errors.BadArgument(f"a time of {timeout} s: use 0 or more, or None for no limit")
-    end = None if timeout is None else time.monotonic() + timeout
+    end = end_of(timeout)
     while status == _c.GIMI_TIMEOUT and not ended():
-        left = PIECE_MS if end is None else min(PIECE_MS, math.ceil((end - time.monotonic()) * 1000))
+        left = left_ms(end, PIECE_MS)
         if left <= 0:
             break
         status = int(call(left))
@@ -77,15 +92,122 @@ class Handle:
             raise SystemExit
         errors.check(status)
 
+
+class Blocking(Handle):
+    """A handle with calls that wait."""
+
+    def until(self, timeout: Optional[float], call: Callable[[int], Any]) -> int:
+        """The status of the call when it is not GIMI_TIMEOUT, or the time is over."""
+        return in_pieces(timeout, call)
+
     def wait(self, timeout: Optional[float], call: Callable[[int], Any]) -> None:
         """Timeout names the whole time, and the library only its last piece."""
-        status = in_pieces(timeout, call)
+        status = self.until(timeout, call)
         if status == _c.GIMI_TIMEOUT:
             raise errors.Timeout(f"nothing came within {timeout} s")
         self.check(status)
 
 
-class Stream(Handle, Generic[Got]):
+class RawSet:
+    """A wait set of the library and its descriptor, which are closed when nobody has it any more."""
+
+    def __init__(self) -> None:
+        made, descriptor = ctypes.c_uint64(), ctypes.c_int32()
+        errors.check(_c.lib.gimi_wait_set_create(made))
+        self.handle = made.value
+        errors.check(_c.lib.gimi_wait_set_descriptor(made, descriptor))
+        self.descriptor = descriptor.value
+
+    def __del__(self) -> None:
+        if hasattr(self, "handle"):
+            _c.lib.gimi_close(self.handle)
+
+    def poll(self, ms: int) -> None:
+        """Until the descriptor is readable. Python sees Ctrl-C meanwhile."""
+        poll = select.poll()
+        poll.register(self.descriptor, select.POLLIN)
+        poll.poll(ms)
+
+    def wake(self) -> None:
+        """Its descriptor is readable until unwake()."""
+        _c.lib.gimi_wait_set_wake(self.handle)
+
+    def unwake(self) -> None:
+        _c.lib.gimi_wait_set_wait(self.handle, _c.gimi_ready(), 1, ctypes.sizeof(_c.gimi_ready), 0, ctypes.c_size_t())
+
+
+class Waitable(Blocking):
+    """A handle from which something comes: wait for it with receive(), with others in a WaitSet, or in select,
+    poll and asyncio by its fileno()."""
+
+    def __init__(self, handle: int, kept: bool = False) -> None:
+        super().__init__(handle, kept)
+        self._set: Optional[RawSet] = None  # of this handle alone, once a thread waits
+        self.shared = False  # the program waits by a descriptor or a WaitSet: nothing is fetched ahead
+
+    @property
+    def number(self) -> int:
+        """The library's; 0 after close()."""
+        return self._handle
+
+    def own_set(self) -> Optional[RawSet]:
+        """None: it is in a WaitSet, or another thread is just making its set."""
+        if self._set is None and not self.shared:
+            made = RawSet()
+            status = _c.lib.gimi_wait_set_add(made.handle, self._handle, 0)
+            if status != _c.GIMI_TAKEN:
+                self.check(status)
+                self._set = made
+        return self._set
+
+    def leave_own_set(self) -> None:
+        """For a WaitSet. Taken: the program waits by fileno()."""
+        if self.shared:
+            raise errors.Taken("it is in a wait set already, or has a fileno(): wait for it in one way")
+        self.shared = True
+        own, self._set = self._set, None
+        if own is not None:
+            _c.lib.gimi_wait_set_remove(own.handle, self._handle)
+            own.wake()  # a thread that waits by it goes on in another way
+
+    def has_ready(self) -> bool:
+        """Something was fetched ahead."""
+        return False
+
+    def fileno(self) -> int:
+        """A descriptor that is readable while receive(0) gives something, for select, poll and asyncio. Read
+        nothing from it, and do not close it. Taken: it is in a WaitSet, which has a fileno() itself."""
+        own = self.own_set()
+        if own is None:
+            raise errors.Taken("it is in a wait set already: use the fileno() of that")
+        if self.has_ready() and not self.shared:
+            own.wake()
+        self.shared = True
+        return own.descriptor
+
+    def close(self) -> None:
+        super().close()
+        if self._set is not None:
+            self._set.wake()
+
+    def until(self, timeout: Optional[float], call: Callable[[int], Any]) -> int:
+        status = int(call(0))
+        if status != _c.GIMI_TIMEOUT:
+            return status
+        end = end_of(timeout)
+        while status == _c.GIMI_TIMEOUT:
+            left = left_ms(end, TIMEOUT_MS_MAX)
+            if left <= 0:
+                break
+            own = self.own_set()
+            if own is None:
+                return in_pieces(None if end == math.inf else left / 1000, call)
+            own.poll(left)
+            status = int(call(0))
+        return status
+
+
+class Stream(Waitable, Generic[Got]):
     """What is received one after the other. Iterating ends when it is closed."""
 
     def receive(self, timeout: Optional[float] = None) -> Got:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any, Deque, Dict, Iterator, List, Optional, Tuple, Type, Union
 
 from . import _c, errors, messages
-from .handles import Exit, Handle, Raw, Stream, in_pieces, sized, to_ms, to_text
+from .handles import Blocking, Exit, Handle, Raw, Stream, Waitable, in_pieces, sized, to_ms, to_text
 from .messages import Event, Message, NodeRecord, Peer, ServiceRecord
 from .requests import Answers, Pending, Reply
 
@@ -26,14 +26,22 @@ class Source(Stream[Message]):
 
     def receive(self, timeout: Optional[float] = None) -> Message:
         try:
-            return self._ready.popleft()
+            message = self._ready.popleft()
         except IndexError:
             pass
+        else:
+            if self.shared and not self._ready and self._set is not None:
+                self._set.unwake()
+            return message
         batch = _c.gimi_batch()
-        self.wait(timeout, lambda ms: _c.lib.gimi_receive_packed(self._handle, _c.GIMI_BATCH_MESSAGES_MAX, ms, batch))
+        most = 1 if self.shared else _c.GIMI_BATCH_MESSAGES_MAX
+        self.wait(timeout, lambda ms: _c.lib.gimi_receive_packed(self._handle, most, ms, batch))
         first, *others = messages.unpacked(batch)
         self._ready.extend(others)
         return first
+
+    def has_ready(self) -> bool:
+        return bool(self._ready)
 
     @property
     def missed(self) -> int:
@@ -59,7 +67,7 @@ class Watch(Stream[Event]):
             _c.lib.gimi_watch_event_release(raw)
 
 
-class Publisher(Handle):
+class Publisher(Blocking):
     """A service that this node provides, until close() or the end of the node."""
 
     # The program can do nothing about these but go on: the hub is away, or slow.
@@ -107,7 +115,7 @@ class State:
     hub_clock_offset: float
 
 
-class Node(Handle):
+class Node(Waitable):
     """A program on the network. Made by connect(); leaves with close(), or at the end of `with`."""
 
     def __init__(self, handle: int) -> None:

@@ -6,7 +6,7 @@ import ctypes
 from typing import Any, Dict, Optional
 
 from . import _c, bitestream, errors, messages
-from .handles import Handle, Stream, in_pieces
+from .handles import Handle, Stream, Waitable, in_pieces
 from .messages import Peer
 
 __all__ = ["Answers", "Pending", "Reply", "Request"]
@@ -36,7 +36,7 @@ class Reply(_Content):
     """The answer of the other program."""
 
 
-class Pending(Handle):
+class Pending(Waitable):
     """A request that was asked. Ends with close(), which cancels it here, or when nobody has it."""
 
     def __init__(self, node: Handle, handle: int) -> None:
@@ -52,6 +52,7 @@ class Pending(Handle):
     def receive(self, timeout: Optional[float] = None) -> Reply:
         """Waits for the end of the request, which comes once. Timeout with `ran` "": not yet."""
         raw = _c.gimi_reply()
+        # In pieces: a descriptor for each request would cost more than the request.
         status = in_pieces(timeout, lambda ms: _c.lib.gimi_wait_for_reply(self._handle, ms, raw), lambda: bool(raw.ended))
         if status == _c.GIMI_TIMEOUT and not raw.ended:
             raise errors.Timeout(f"no end of the request within {timeout} s")

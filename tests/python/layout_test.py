@@ -52,7 +52,7 @@ class Layout(unittest.TestCase):
             declared = re.search(rf"\b{name}\((.*?)\);", text, re.DOTALL)
             self.assertTrue(declared, name)
             words = [] if declared[1] == "void" else declared[1].split(",")
-            sizes = [8 if re.search(r"\*|gimi_handle|size_t", word) else 4 for word in words]
+            sizes = [8 if re.search(r"\*|gimi_handle|size_t|int64_t", word) else 4 for word in words]
             self.assertEqual([ctypes.sizeof(kind) for kind in getattr(_c.lib, name).argtypes], sizes, name)
 
     def test_each_status_has_an_exception(self):

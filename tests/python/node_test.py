@@ -4,6 +4,7 @@
 import collections
 import gc
 import os
+import pathlib
 import signal
 import subprocess
 import sys
@@ -237,7 +238,8 @@ if __name__ == "__main__":
 
     def test_programs_that_start_and_end_leave_nothing(self):
         """A third of them is killed; the next one of that name takes its place."""
-        for number in range(1000 if os.environ.get("GIMNET_STRESS") == "full" else 20):
+        full, begun = os.environ.get("GIMNET_STRESS") == "full", time.time()
+        for number in range(1000 if full else 20):
             process = program("print('ready', flush=True)\nsys.stdin.read()", self.hub, "n")
             self.assertEqual(process.stdout.readline(), "ready\n", process.stderr)
             if number % 3 == 0:
@@ -248,8 +250,23 @@ if __name__ == "__main__":
                 self.assertEqual((process.wait(PATIENCE_S), process.stderr.read()), (0, ""))
                 process.stdout.close()
                 process.stderr.close()
+        lines = f"""
+node.close()
+for number in range({1 if full else 80}):  # those begin with Python running
+    if os.fork() == 0:
+        node = gimnet.connect("n", hub={self.hub.url!r})
+        waits = threading.Thread(target=node.subscribe("x/y").receive)
+        waits.start()
+        if number % 3 == 0: os.kill(os.getpid(), 9)
+        sys.exit(0)
+    os.wait()
+print(len(os.listdir("/proc/self/task")), len(os.listdir("/proc/self/fd")))
+"""
+        self.assertEqual(self.ends(program(lines, self.hub, "first"), 0), "1 4\n")
         with gimnet.connect("n", hub=self.hub.url) as last:
             self.assertEqual([node.name for node in last.nodes()], ["n"])
+        self.assertEqual([path for path in pathlib.Path(os.environ["XDG_RUNTIME_DIR"]).rglob("*") if path.stat().st_mtime >= begun
+                          and path.is_file() and self.hub.url in path.read_text(errors="replace")], [])
 
     def test_a_thousand_handles_leave_no_thread_or_descriptor(self):
         with gimnet.connect("n", hub=self.hub.url) as node:
