@@ -4,7 +4,9 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <span>
+#include <string>
 #include <string_view>
 #include <utility>
 
@@ -46,6 +48,26 @@ TEST(ByteBuffer, MovesItsMemory) {
   ByteBuffer assigned;
   assigned = std::move(to);
   EXPECT_EQ(text(assigned), "GIMnet");
+}
+
+TEST(ByteBuffer, AlignsOneByteHoweverItGrows) {
+  for (const std::size_t aligned_at : {0u, 1u, 12u, 20u, 64u, 1000u}) {
+    ByteBuffer buffer(aligned_at);
+    std::string all;
+    for (std::size_t i = 0; i < 40; ++i) {
+      const std::string more(i * i * 20 + 1, static_cast<char>('a' + i));
+      ASSERT_TRUE(buffer.append(bytes(more), 300'000));
+      all += more;
+      const auto address = reinterpret_cast<std::uintptr_t>(buffer.data()) + aligned_at;
+      EXPECT_EQ(address % ByteBuffer::kAlignment, 0u) << buffer.size();
+    }
+    EXPECT_TRUE(text(buffer) == all) << aligned_at;
+    ByteBuffer moved;
+    moved = std::move(buffer);
+    ASSERT_TRUE(moved.reserve(1'000'000));
+    EXPECT_EQ((reinterpret_cast<std::uintptr_t>(moved.data()) + aligned_at) % 64, 0u);
+    EXPECT_TRUE(text(moved) == all) << aligned_at;
+  }
 }
 
 TEST(ByteBuffer, KeepsItsMemoryWhenCleared) {

@@ -200,21 +200,32 @@ Inbound::Verdict Inbound::take_fragment(const proto::FrameView& view, const std:
     add_frame(view, frame);  // it came in one piece
     return Verdict::going;
   }
+  add_whole(view, frame, std::move(reassembled.storage));
+  return Verdict::going;
+}
+
+void Inbound::add_whole(const proto::FrameView& view, const std::byte* frame, ByteBuffer payload) {
   auto record = std::make_unique<Record>();
   record->incoming = incoming_of({nullptr, frame, arrival_.wall_ns, 0, 0});
-  record->payload = std::move(reassembled.storage);
+  record->payload = std::move(payload);
   record->extensions.assign(view.extensions.begin(), view.extensions.end());
   record->incoming.epoch = epoch_of(view.header);
   record->finish();
   ++counts_.messages;
   const std::size_t bytes = record->payload.size();
   add_record(record.release(), bytes);
-  return Verdict::going;
 }
 
 /// The message pays for its own bytes and for what lies before it in slabs that messages keep: of
 /// 256 KiB that another node wrote, one message may be all that the program gets.
 void Inbound::add_frame(const proto::FrameView& view, const std::byte* frame) {
+  // Other libraries may send larger ones in one piece. Data of this size are aligned.
+  const auto size = static_cast<std::uint32_t>(view.payload.size());
+  if (size > proto::kUncutMessageMax) {
+    ByteBuffer copy(data_begin(view, size));
+    if (copy.reserve(size) && copy.append(view.payload))
+      return add_whole(view, frame, std::move(copy));
+  }
   const std::size_t end =
       static_cast<std::size_t>(frame - slab_->bytes()) + view.header.frame_size();
   const std::size_t bytes = std::exchange(uncharged_bytes_, 0) + end - charged_;

@@ -128,6 +128,8 @@ class Inbound {
   [[nodiscard]] Verdict take_name_lost(std::span<const std::byte> payload);
   [[nodiscard]] Verdict take_report(const proto::FrameView& view);
   void add_frame(const proto::FrameView& view, const std::byte* frame);
+  /// A message whose payload has memory of its own.
+  void add_whole(const proto::FrameView& view, const std::byte* frame, ByteBuffer payload);
   void add_record(Record* record, std::size_t bytes);
   void add_events(std::span<const Item> events);
   [[nodiscard]] std::uint32_t epoch_of(const proto::FrameHeader& header);

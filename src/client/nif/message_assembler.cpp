@@ -1,5 +1,7 @@
 #include "client/nif/message_assembler.hpp"
 
+#include "proto/gimi/message_header.hpp"
+
 namespace gimnet::nif {
 namespace {
 
@@ -13,6 +15,10 @@ bool has_window(const proto::FrameView& view) {
 }
 
 }  // namespace
+
+std::size_t data_begin(const proto::FrameView& view, std::uint32_t size) {
+  return size - proto::gimi::application_bytes(view.key.has_value(), view.payload, size);
+}
 
 void MessageAssembler::forget_ended() {
   std::unordered_map<std::uint64_t, OpenMessage> open;
@@ -50,8 +56,10 @@ std::optional<proto::Taken> MessageAssembler::progress(const proto::FrameView& v
 
 MessageAssembler::Step MessageAssembler::take(const proto::FrameView& view, std::int64_t now_ns) {
   const proto::FragmentHeader& fragment = *view.fragment;
-  Step step{reassembler_.take(proto::FragmentStream::of(view.header), fragment, view.payload),
-            std::nullopt};
+  const std::size_t aligned_at = fragment.offset == 0 ? data_begin(view, fragment.total) : 0;
+  Step step{
+      reassembler_.take(proto::FragmentStream::of(view.header), fragment, view.payload, aligned_at),
+      std::nullopt};
   using State = proto::Reassembled::State;
   if (!has_window(view)) return step;
   if (step.reassembled.state == State::part || step.reassembled.state == State::whole) {

@@ -14,6 +14,9 @@
 
 namespace gimnet::nif {
 
+/// The first byte of the application in a payload of `size` bytes that begins as this frame's does.
+[[nodiscard]] std::size_t data_begin(const proto::FrameView& view, std::uint32_t size);
+
 /// Fragments in, whole messages and TAKENs out: proto's Reassembler with a receive window for each
 /// large UNICAST message. Thread safety: one thread. Memory: within the limits, whatever a peer
 /// claims.

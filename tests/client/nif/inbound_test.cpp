@@ -125,6 +125,33 @@ TEST(Inbound, PutsFragmentsTogetherAndTellsOfLoss) {
   EXPECT_EQ(receiving.inbound.counts().messages_lost, 2u);
 }
 
+TEST(Inbound, AlignsLargeDataBehindTheHeaderOfGimi) {
+  constexpr std::size_t kHeader = 12 + 8;
+  std::string payload(20'000, 'x');
+  payload[8] = 0;  // DATA
+  payload[9] = 0;
+  payload[10] = 8;  // bytes of extension
+  payload[11] = 0;
+  for (const std::size_t piece : {std::size_t{3'000}, std::size_t{8'192}, payload.size()}) {
+    Receiving receiving;
+    std::vector<std::byte> bytes;
+    add_frame(bytes, from_peer(), "first");
+    for (std::size_t at = 0; at < payload.size(); at += piece) {
+      proto::FrameParts parts =
+          fragment(1, static_cast<std::uint32_t>(at), static_cast<std::uint32_t>(payload.size()));
+      parts.key = 99;
+      if (piece == payload.size()) parts.fragment.reset();
+      add_frame(bytes, parts, payload.substr(at, piece));
+    }
+    ASSERT_EQ(receiving.feed(bytes), Inbound::Verdict::going);
+    ASSERT_EQ(receiving.host.items.size(), 2u) << piece;
+    const auto address = reinterpret_cast<std::uintptr_t>(receiving.host.items[1].payload);
+    EXPECT_EQ((address + kHeader) % 64, 0u) << piece;
+    EXPECT_TRUE(receiving.host.texts()[1] == payload) << piece;
+    EXPECT_EQ(receiving.host.items[1].key, 99u);
+  }
+}
+
 TEST(Inbound, CountsMessagesThatWereUnfinishedWhenTheConnectionBroke) {
   Receiving receiving;
   std::vector<std::byte> bytes;
