@@ -99,6 +99,12 @@ GIMNET_API gimi_status gimi_publish(gimi_handle publisher, const void* data, siz
  * the status is that of the next one. `published` may be NULL. */
 GIMNET_API gimi_status gimi_publish_many(gimi_handle publisher, const gimi_bytes* messages,
                                          size_t count, int32_t timeout_ms, size_t* published);
+/** Lends memory for a message of `size` bytes, to be published without another copy in the program.
+ * GIMI_TOO_LARGE (over 1 GiB), GIMI_SYSTEM (no memory). Release or publish it. */
+GIMNET_API gimi_status gimi_loan(gimi_handle publisher, size_t size, gimi_loaned* loan);
+/** gimi_publish() of a loan. One that was sent is empty then; one that was not goes on as it is. */
+GIMNET_API gimi_status gimi_publish_loan(gimi_handle publisher, gimi_loaned* loan,
+                                         int32_t timeout_ms, int32_t more);
 /** The number of subscribers, as the hub told last; 0 also if there is no such publisher. */
 GIMNET_API size_t gimi_subscribers(gimi_handle publisher);
 /** Waits until there are that many. */

@@ -32,7 +32,8 @@ typedef struct gimi_identity gimi_identity;
  * long copies those. A struct may be moved in memory. It has 128 bytes where pointers have 64 bits;
  * the reserved members are for later versions. */
 typedef struct gimi_message {
-  const void* data; /**< NULL if size is 0. Valid until: release. */
+  const void*
+      data; /**< NULL if size is 0. More than 8 KiB are aligned to 64. Valid until: release. */
   size_t size;
   const char* service; /**< Full name of the service that published it, "" for one that was sent to
                           this node. NULL in an empty struct. Valid until: release. */
@@ -57,6 +58,19 @@ typedef struct gimi_message {
 /** Gives the memory back and empties the struct; does nothing with an empty one. NULL is ignored.
  */
 GIMNET_API void gimi_message_release(gimi_message* message);
+
+/** Memory of the library for a message that is to be published. The program fills it, and may make
+ * size smaller. */
+typedef struct gimi_loaned {
+  void* data; /**< Aligned to 64. NULL in an empty struct. Valid until: it is published or released.
+               */
+  size_t size;
+  void* storage; /**< The library's. */
+  uint64_t reserved[3];
+} gimi_loaned;
+
+/** As gimi_message_release(), of a loan that is not published. */
+GIMNET_API void gimi_loan_release(gimi_loaned* loan);
 
 /** Most messages of one gimi_receive_packed(). */
 #define GIMI_BATCH_MESSAGES_MAX 64

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 
@@ -161,6 +162,33 @@ class Published : public Outcome<void> {
   Published(Outcome<void> outcome) : Outcome<void>(std::move(outcome)) {}
 };
 
+/// Memory of the library for a message that is to be published (Publisher::loan()), aligned to 64.
+/// Thread safety: a value that can be moved; one thread at a time.
+class Loan {
+ public:
+  /// Takes over what the library gave out.
+  explicit Loan(const gimi_loaned& loan) : loan_(loan) {}
+  Loan(Loan&& other) noexcept : loan_(std::exchange(other.loan_, {})) {}
+  Loan& operator=(Loan&& other) noexcept {
+    std::swap(loan_, other.loan_);
+    return *this;
+  }
+  Loan(const Loan&) = delete;
+  Loan& operator=(const Loan&) = delete;
+  ~Loan() { gimi_loan_release(&loan_); }
+
+  /// Valid until: this loan is published, moved from or destroyed.
+  [[nodiscard]] std::span<std::byte> data() const {
+    return {static_cast<std::byte*>(loan_.data), loan_.size};
+  }
+  /// Fewer bytes are published. REQUIRES: size <= data().size().
+  void shrink(std::size_t size) { loan_.size = size; }
+
+ private:
+  friend class Publisher;
+  gimi_loaned loan_;
+};
+
 /// An own service that provides data. Copies are the same service; with the last one it ends, which
 /// asks the hub and waits for its answer, a second at most.
 class Publisher {
@@ -177,6 +205,19 @@ class Publisher {
   }
   Published publish(BytesView data, More more) const {
     return publish(data, kPublishTimeout, more);
+  }
+  /// Memory for a message of so many bytes, which the program fills in place. Errors: too_large
+  /// (over 1 GiB), system (no memory), closed.
+  Outcome<Loan> loan(std::size_t size) const {
+    gimi_loaned loan{};
+    const gimi_status status = gimi_loan(handle_->value(), size, &loan);
+    if (status != GIMI_OK) return failure_of(status);
+    return Loan(loan);
+  }
+  /// publish() of a loan. One that was sent is empty then; one that was not goes on as it is.
+  Published publish(Loan& loan, Timeout timeout = kPublishTimeout, More more = More::no) const {
+    return detail::outcome_of(gimi_publish_loan(
+        handle_->value(), &loan.loan_, milliseconds_of(timeout), more == More::yes ? 1 : 0));
   }
   /// Their number, as the hub told last.
   [[nodiscard]] std::size_t subscribers() const { return gimi_subscribers(handle_->value()); }

@@ -1,3 +1,7 @@
+#include <algorithm>
+#include <memory>
+
+#include "base/byte_buffer.hpp"
 #include "client/gimi/api.hpp"
 
 // The C API: services that give data.
@@ -59,6 +63,38 @@ gimi_status gimi_publish_many(gimi_handle publisher, const gimi_bytes* messages,
     }
     return GIMI_OK;
   });
+}
+
+gimi_status gimi_loan(gimi_handle publisher, size_t size, gimi_loaned* loan) {
+  if (loan == nullptr) return is_null("gimi_loan(): loan");
+  *loan = {};
+  return with<PublisherObject>(publisher, [&](PublisherObject&) -> gimi_status {
+    if (size > NIF_MESSAGE_BYTES_MAX)
+      return fail(GIMI_TOO_LARGE, "cannot lend " + std::to_string(size) + " bytes: at most 1 GiB");
+    auto memory = std::make_unique<ByteBuffer>();
+    if (!memory->reserve(std::max<std::size_t>(size, 1)))
+      return fail(GIMI_SYSTEM, "no memory to lend " + std::to_string(size) + " bytes");
+    loan->data = memory->data();
+    loan->size = size;
+    loan->storage = memory.release();
+    return GIMI_OK;
+  });
+}
+
+gimi_status gimi_publish_loan(gimi_handle publisher, gimi_loaned* loan, int32_t timeout_ms,
+                              int32_t more) {
+  if (loan == nullptr || loan->storage == nullptr) return is_null("gimi_publish_loan(): loan");
+  if (loan->size > static_cast<ByteBuffer*>(loan->storage)->capacity())
+    return fail(GIMI_BAD_ARGUMENT, "cannot publish the loan: its size is more than was lent");
+  const gimi_status status = gimi_publish(publisher, loan->data, loan->size, timeout_ms, more);
+  if (status == GIMI_OK || status == GIMI_NOT_RETAINED) gimi_loan_release(loan);
+  return status;
+}
+
+void gimi_loan_release(gimi_loaned* loan) {
+  if (loan == nullptr) return;
+  delete static_cast<ByteBuffer*>(loan->storage);
+  *loan = {};
 }
 
 size_t gimi_subscribers(gimi_handle publisher) {
