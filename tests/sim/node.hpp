@@ -88,9 +88,10 @@ class SimNode {
     std::optional<std::uint8_t> number;  ///< of the counts; nothing: none begun
     std::uint64_t messages = 0;
     std::uint64_t credited = 0;
-    std::uint64_t last = 0;         ///< number of the last message
-    std::uint32_t window = 0;       ///< in force; 0: none, or not known yet
-    std::uint32_t window_most = 0;  ///< that may have been in force; 0: not known
+    std::uint64_t last = 0;           ///< number of the last message
+    std::uint32_t window = 0;         ///< in force; 0: none, or not known yet
+    std::uint32_t window_most = 0;    ///< that may have been in force; 0: not known
+    std::uint64_t before_window = 0;  ///< messages up to that one may have gone without a window
     bool retained = false;
     bool credit_due = false;
   };

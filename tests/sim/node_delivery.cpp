@@ -170,6 +170,8 @@ void SimNode::know_window(Link& link, const std::string& full_name, const ns::Se
                           std::uint8_t number) {
   Taken& taken = link.taken[state.group.value()];
   link.gone.erase(state.group.value());
+  if (taken.number && taken.window == 0 && state.window != 0)
+    taken.before_window = around_.setting.messages;
   if (taken.number != number || taken.window == 0) taken.messages = taken.credited = 0;
   taken.number = number;
   taken.window = state.window;
@@ -204,8 +206,8 @@ void SimNode::take_message(Link& from, GroupId group, std::uint64_t message) {
     return entry.second.operation == ns::Subscribe::kOperation;
   });
   // Before the answer it does not know what is in force.
-  const bool within =
-      taken.window_most == 0 || asks || taken.messages - taken.credited <= taken.window_most;
+  const bool within = taken.window_most == 0 || asks || message <= taken.before_window ||
+                      taken.messages - taken.credited <= taken.window_most;
   require(within, Checker::credit,
           "a subscriber gets more messages than its window, not counting what it credited");
   if (taken.window == 0) return;

@@ -48,7 +48,7 @@ constexpr std::int32_t kCode = 7;
 
 std::uint64_t wanted_answers() { return is_full_size() ? 100'000 : 10'000; }
 std::uint64_t answers_between_events() { return is_full_size() ? 2'000 : 1'000; }
-/// How late a request may end. A test that runs beside others cannot be as strict.
+/// A request ends at most so late. A test that runs beside others cannot be as strict.
 std::chrono::milliseconds grace() { return std::chrono::milliseconds(is_full_size() ? 100 : 1000); }
 
 /// The program that answers: does what each request asks for until it is killed.
@@ -106,7 +106,7 @@ class Answering {
   pid_t process_ = -1;
 };
 
-/// What a request said at its end.
+/// The end of a request, as it was told.
 struct Ending {
   std::uint64_t number = 0;
   Ran ran = Ran::no;

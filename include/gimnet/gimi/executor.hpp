@@ -20,7 +20,7 @@
 //     gimnet::Executor executor;
 //     executor.on(pose, [](const gimnet::Message& message) { show(message.text()); }).or_throw();
 //     executor.every(std::chrono::milliseconds{100}, [&] { odometry.publish(position()); });
-//     executor.run();
+//     executor.run().or_throw();
 
 namespace gimnet::inline v0_9 {
 
