@@ -147,21 +147,29 @@ class Folder(unittest.TestCase):
 
 
 class Programs(unittest.TestCase):
+    def kill(self, hub, receiver):
+        """Until the hub knows: it refuses its name to a newcomer while it takes the connection for a live one."""
+        receiver.signal(signal.SIGKILL)
+        receiver.wait()
+        wait_until(lambda: not any(node["connected"] and node["name"] for node in hub.nodes()), "the node is away")
+
+    def wait_said(self, process, words):
+        wait_until(lambda: words in process.err, words)
+
     def test_a_token_file_that_cannot_be_used_is_named(self):
         hub = Hub(self)
         with tempfile.TemporaryDirectory() as runtime:
             env = {"XDG_RUNTIME_DIR": runtime}
-            start_recv(self, hub, "cam", env=env).signal(signal.SIGKILL)
+            self.kill(hub, start_recv(self, hub, "cam", env=env))
             tokens = os.path.join(runtime, "gimnet", "tokens")
             path = os.path.join(tokens, os.listdir(tokens)[0])
             with open(path, "w", encoding="utf-8") as file:
                 file.write("no token")
             receiver = start_recv(self, hub, "cam", env=env)
-            self.assertIn(f"the token file {path} is not used, and the node may get a new id", receiver.err)
-            receiver.signal(signal.SIGKILL)
-            receiver.wait()
+            self.wait_said(receiver, f"the token file {path} is not used, and the node may get a new id")
+            self.kill(hub, receiver)
             os.chmod(path, 0o644)
-            self.assertIn(f"{path} is another user's, open to others, or no file", start_recv(self, hub, "cam", env=env).err)
+            self.wait_said(start_recv(self, hub, "cam", env=env), f"{path} is another user's, open to others, or no file")
 
     def test_a_folder_is_no_address_of_a_hub(self):
         with tempfile.TemporaryDirectory() as folder:

@@ -205,7 +205,7 @@ class Hub:
 
     def wait_for_node(self, name):
         def there():
-            return next((node for node in self.nodes() if node["name"] == name), None)
+            return next((node for node in self.nodes() if node["name"] == name and node["connected"]), None)
         return wait_until(there, f"node {name}")
 
 
