@@ -43,5 +43,25 @@ void sizes(benchmark::internal::Benchmark* bench) {
 BENCHMARK_CAPTURE(fan_out, by_copy, false)->Apply(sizes);
 BENCHMARK_CAPTURE(fan_out, by_reference, true)->Apply(sizes);
 
+/// Ten recipients, the last of them in that slot: those between are free.
+void broadcast(benchmark::State& state) {
+  testing::RouteRig rig;
+  for (std::uint32_t i = 0; i < 9; ++i) rig.add_here(2 + i);
+  rig.add_here(static_cast<std::uint32_t>(state.range(0)));
+  const hub::Run run =
+      rig.make_run(7u << 20 | kEveryIndex, {"x"}, {.kind = proto::Kind::broadcast});
+  for (auto _ : state) {
+    rig.route(run);
+    for (Recipient* recipient : rig.recipients.dirty()) {
+      recipient->dirty = false;
+      recipient->outbox.drop_all(proto::DropReason::link_lost, rig.egress.context);
+    }
+    rig.recipients.dirty().clear();
+    static_cast<void>(rig.take_mail());
+  }
+  state.SetItemsProcessed(state.iterations() * 10);
+}
+BENCHMARK(broadcast)->Arg(11)->Arg(1'000)->Arg(10'000)->Arg(100'000);
+
 }  // namespace
 }  // namespace gimnet::hub

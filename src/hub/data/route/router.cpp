@@ -347,18 +347,26 @@ void Router::to_everybody(const Run& run, const proto::FrameHeader& header, Arri
   if (to_all && !arrival.handed_over() && from_ != before)
     return fanout_.context().tally.drop(proto::DropReason::wrong_way, run.frames);
   std::uint32_t outcomes = 0;
-  const std::size_t slots = fanout_.recipients().by_slot().size();
-  deliveries_ += slots;
+  const RecipientTable& recipients = fanout_.recipients();
   const Handover handover{.fan_out = true};
-  for (Recipient* recipient : fanout_.recipients().by_slot()) {
-    if (recipient == nullptr || recipient->node == NodeId{header.src}) continue;
-    if (recipient->is_link() && !(to_all && carries_to(*recipient, before))) continue;
-    fanout_.deliver(*recipient, run, header, handover);
+  for (Recipient* node : recipients.nodes()) {
+    if (node->node == NodeId{header.src}) continue;
+    fanout_.deliver(*node, run, header, handover);
     ++outcomes;
   }
+  std::size_t deliveries = recipients.nodes().size();
+  if (to_all) {
+    for (Recipient* link : recipients.links()) {
+      if (!carries_to(*link, before)) continue;
+      fanout_.deliver(*link, run, header, handover);
+      ++outcomes;
+    }
+    deliveries += recipients.links().size();
+  }
+  deliveries_ += deliveries;
   // Nodes are spread over the shards: there are about as many on each other one.
   const std::uint64_t shards = nodes_.shards() | (to_all ? routes_.shards() : 0);
-  if (!arrival.handed_over()) to_other_shards(run, shards, slots, outcomes);
+  if (!arrival.handed_over()) to_other_shards(run, shards, deliveries, outcomes);
   settle(run, outcomes);
 }
 

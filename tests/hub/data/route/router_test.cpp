@@ -234,6 +234,19 @@ TEST_F(RouterTest, BroadcastToAllButTheSender) {
   EXPECT_EQ(dropped(DropReason::no_route), 1u);
 }
 
+TEST_F(RouterTest, BroadcastToThoseThatAreLeft) {
+  Recipient& first = rig.add_here(2);
+  const std::array left{&rig.add_here(900), &rig.add_here(3), &rig.add_here(40)};
+  Recipient& last = rig.add_here(5);
+  rig.recipients.remove(last);
+  rig.recipients.remove(first);
+  rig.route(kHub | kEveryIndex, {"x"}, {.kind = Kind::broadcast});
+  for (Recipient* const recipient : left) EXPECT_EQ(recipient->outbox.lane(1).entries().size(), 1u);
+  EXPECT_TRUE(first.outbox.empty());
+  EXPECT_TRUE(last.outbox.empty());
+  EXPECT_EQ(rig.router.deliveries(), 3u) << "free slots cost nothing";
+}
+
 TEST_F(RouterTest, WhatWasHandedOverStaysHere) {
   Recipient& a = rig.add_here(2);
   rig.add_there(3);
