@@ -246,8 +246,7 @@ Result<Welcomed, NetError> dial_hub(const Address& address, const DialOptions& o
       error->sentence += " (through the proxy " + options.proxy->shown() + ")";
     return std::move(*error);
   }
-  const auto rest = handshake.rest();
-  return Welcomed{std::move(*dialed), handshake.welcome(), {rest.begin(), rest.end()}};
+  return Welcomed{std::move(*dialed), handshake.welcome()};
 }
 
 std::int64_t DialBackoff::next_ns(std::uint64_t random) {

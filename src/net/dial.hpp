@@ -26,7 +26,6 @@ namespace gimnet::net {
 struct Welcomed {
   std::unique_ptr<Stream> stream;
   proto::Welcome welcome;
-  std::vector<std::byte> rest;  ///< bytes of the hub that came behind WELCOME
 };
 
 /// The terms of dialling a hub. A value type.

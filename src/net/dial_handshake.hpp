@@ -34,10 +34,6 @@ class DialHandshake {
 
   /// After `welcome`.
   [[nodiscard]] const proto::Welcome& welcome() const { return welcome_; }
-  /// After `welcome`: the bytes that came behind it.
-  [[nodiscard]] std::span<const std::byte> rest() const {
-    return std::span(bytes_).subspan(taken_);
-  }
   /// After `goodbye`.
   [[nodiscard]] const proto::Goodbye& goodbye() const { return goodbye_; }
   /// After `failed`: Fault::protocol or Fault::bad_version.

@@ -15,8 +15,7 @@ Result<Admitted, Failure> admit_at(const net::Address& address, const net::DialO
   if (!session) {
     return Failure{session.error().status, address.url() + ": " + session.error().sentence};
   }
-  return Admitted{std::move(welcomed->stream), address.url(), std::move(*session),
-                  std::move(welcomed->rest)};
+  return Admitted{std::move(welcomed->stream), address.url(), std::move(*session)};
 }
 
 }  // namespace

@@ -19,7 +19,6 @@ struct Admitted {
   std::unique_ptr<net::Stream> stream;
   std::string address;  ///< of the hub, as a URL
   Session session;
-  std::vector<std::byte> rest;  ///< bytes of the hub that came behind WELCOME
 };
 
 /// The token to show at an address; empty: none.

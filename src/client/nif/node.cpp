@@ -143,7 +143,6 @@ bool Node::take_over(Admitted admitted, bool first) {
   credits_.tell_all();
   inbound_.begin(session_);
   confirmed_ = inbound_.taken();
-  behind_welcome_ = std::move(admitted.rest);
   if (!first) {
     declarations_.declare_again({!session_.resumed, !session_.resumed || *let_go > 0});
     received_.push(declarations_.take_events());

@@ -177,8 +177,6 @@ class Node final : private InboundHost {
   TokenStore tokens_;
   std::unique_ptr<net::Stream> stream_;  ///< null: not connected
   Session session_;
-  std::vector<std::byte>
-      behind_welcome_;   ///< came in one read with it, and is the first that is taken
   std::string address_;  ///< of the hub that admitted it last, as a URL
   std::string name_;     ///< to ask for
   net::DialBackoff backoff_;

@@ -84,11 +84,9 @@ void Node::turn() {
     disconnect("the connection to the hub broke while writing", proto::GoodbyeCode::done);
     return;
   }
-  const bool read_already = reading && !behind_welcome_.empty();
-  const Deadline until = read_already ? steady_now_ns() : next_timer(reading, wants.last_write_ns);
+  const Deadline until = next_timer(reading, wants.last_write_ns);
   const net::Interest interest = net::interest_of(reading, wants.blocked, wants.pending_out);
-  net::Readiness ready = net::wait_for(stream_.get(), interest, wake_, until);
-  ready.readable = ready.readable || read_already;
+  const net::Readiness ready = net::wait_for(stream_.get(), interest, wake_, until);
   if (ready.woken) wake_.clear();
   if (ready.woken || ready.writable) outbound_.write_pending(ready.writable);
   const std::int64_t now = steady_now_ns();
@@ -107,13 +105,6 @@ void Node::turn() {
 void Node::read_some(std::int64_t now) {
   const auto space = inbound_.space();
   if (space.empty()) throw std::bad_alloc();
-  if (!behind_welcome_.empty()) {
-    const std::size_t bytes = std::min(space.size(), behind_welcome_.size());
-    const auto end = behind_welcome_.begin() + static_cast<std::ptrdiff_t>(bytes);
-    std::copy(behind_welcome_.begin(), end, space.begin());
-    behind_welcome_.erase(behind_welcome_.begin(), end);
-    return take_read(bytes, now);
-  }
   const net::IoResult result = stream_->receive(space);
   if (result.status == net::IoStatus::would_block) return;
   if (result.status != net::IoStatus::ok) {

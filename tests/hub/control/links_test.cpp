@@ -82,7 +82,7 @@ TEST(Links, OneThatCameBackTooLateBeginsAnewAtBothEnds) {
   proto::Welcome welcome = hubs.a.attached().welcome;
   welcome.resumed = true;
   const std::size_t attached = hubs.b.shards.all<AttachCommand>().size();
-  hubs.b.links.on_dialled(late.link, net::Welcomed{std::make_unique<NoStream>(), welcome, {}},
+  hubs.b.links.on_dialled(late.link, net::Welcomed{std::make_unique<NoStream>(), welcome},
                           hubs.b.moment());
   EXPECT_EQ(hubs.b.shards.all<AttachCommand>().size(), attached) << "the other end counts on";
   hubs.b.pass(milliseconds{1'000});

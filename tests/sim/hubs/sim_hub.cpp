@@ -116,7 +116,7 @@ std::optional<proto::Goodbye> SimHub::admit(hub::Stranger stranger, hub::MemoryP
 void SimHub::on_dialled(hub::LinkNumber link, std::unique_ptr<net::Stream> stream,
                         hub::MemoryPeer peer, const proto::Welcome& welcome, milliseconds now) {
   add_peer(stream.get(), std::move(peer));
-  conductor_.on_dialled(link, net::Welcomed{std::move(stream), welcome, {}}, now);
+  conductor_.on_dialled(link, net::Welcomed{std::move(stream), welcome}, now);
 }
 
 void SimHub::on_not_dialled(hub::LinkNumber link, net::NetError error, milliseconds now) {

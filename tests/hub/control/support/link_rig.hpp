@@ -131,7 +131,7 @@ struct LinkedRigs {
     ASSERT_FALSE(refusal) << refusal->sentence;
     proto::Welcome welcome = a.attached().welcome;
     welcome.resumed = resumed;
-    b.links.on_dialled(dialled.link, net::Welcomed{std::make_unique<NoStream>(), welcome, {}},
+    b.links.on_dialled(dialled.link, net::Welcomed{std::make_unique<NoStream>(), welcome},
                        b.moment());
   }
   /// Carries control frames to and fro until none is under way.
