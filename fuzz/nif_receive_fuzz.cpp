@@ -81,6 +81,7 @@ class Witness final : public InboundHost {
          std::to_string(taken.taken) + " " + std::to_string(taken.allowed));
   }
   [[nodiscard]] std::uint32_t epoch_for(std::uint32_t group) override { return group & 1; }
+  [[nodiscard]] bool may_wait(std::uint32_t, std::size_t) override { return true; }
   void on_message_lost(std::uint32_t) override {}
   void deliver(std::span<const Item> items) override {
     for (const Item& item : items) {

@@ -95,6 +95,7 @@ class World final : public nif::InboundHost {
   }
   void send_taken(std::uint32_t, const proto::Taken&) override {}
   [[nodiscard]] std::uint32_t epoch_for(std::uint32_t) override { return 0; }
+  [[nodiscard]] bool may_wait(std::uint32_t, std::size_t) override { return true; }
   void on_message_lost(std::uint32_t) override {}
 
  private:

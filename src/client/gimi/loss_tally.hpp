@@ -85,6 +85,7 @@ class LossTally {
   }
   [[nodiscard]] Count& place(proto::DropReason reason) {
     if (reason == proto::DropReason::cut_message) return incomplete_;
+    if (reason == proto::DropReason::no_subscriber) return unknown_service_;  // dropped by NIF
     return reason == proto::DropReason::too_large ? too_large_ : frames_broken_off_;
   }
 

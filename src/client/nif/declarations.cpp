@@ -22,6 +22,12 @@ void add_refusal(Record& record, const proto::Refusal& refusal) {
   if (record.payload.append(std::as_bytes(std::span(refusal.sentence)))) record.finish();
 }
 
+/// The hub ended it, or knew nothing of it.
+template <class Answer>
+bool is_gone(const Answer& answer) {
+  return answer || answer.error().status == proto::Status::not_found;
+}
+
 }  // namespace
 
 Declarations::~Declarations() {
@@ -147,7 +153,9 @@ bool Declarations::on_service_moved(const proto::ns::ServiceMoved& event) {
   if (found == subscriptions_.end()) {
     // Its SUBSCRIBE was answered a moment ago, or is not yet.
     const auto beginning = beginning_.find(event.name);
-    if (beginning != beginning_.end()) credits_.open(event.group, event.window, beginning->second);
+    if (beginning == beginning_.end()) return true;
+    credits_.open(event.group, event.window, beginning->second);
+    answered_.push_back(event.group);
     return true;
   }
   const GroupId former = std::exchange(found->second.group, event.group);
@@ -198,17 +206,29 @@ void Declarations::end_declaring() {
   bring_last_messages();
   outbound_.end_declaring();
   if (lost == 0) return;
-  const std::string reason = proto::drop_reason_name(proto::DropReason::no_such_group);
-  Record* record = make_event(NIF_GAP, reason);
-  record->incoming.from = outbound_.id();
-  record->incoming.count = lost;
-  record->incoming.reason = static_cast<std::uint32_t>(proto::DropReason::no_such_group);
-  events_.push_back(item_of(record, reason.size()));
+  add_gap(lost, proto::DropReason::no_such_group);
+  static_cast<Record*>(events_.back().storage)->incoming.from = outbound_.id();
 }
 
-void Declarations::answered() {
-  if (under_way_ > 0) --under_way_;
-  go_on();
+void Declarations::add_gap(std::uint64_t count, proto::DropReason reason) {
+  const std::string name = proto::drop_reason_name(reason);
+  Record* record = make_event(NIF_GAP, name);
+  record->incoming.count = count;
+  record->incoming.reason = static_cast<std::uint32_t>(reason);
+  events_.push_back(item_of(record, name.size()));
+}
+
+bool Declarations::ask(const proto::Payload& request, RequestTable::Handler on_answer) {
+  const auto handler = [this, on_answer = std::move(on_answer),
+                        round = round_](const proto::Payload& answer) {
+    if (round != round_) return;
+    on_answer(answer);
+    if (under_way_ > 0) --under_way_;
+    go_on();
+  };
+  if (!requests_.ask_later(proto::Kind::ns, request, handler)) return false;
+  ++under_way_;
+  return true;
 }
 
 bool Declarations::declare_service(const std::string& service) {
@@ -219,30 +239,19 @@ bool Declarations::declare_service(const std::string& service) {
   if (found == services_.end()) return true;  // withdrawn meanwhile
   Service& own = found->second;
   if (own.ended && !own.asked) return withdraw_service(service, own.group);
-  const auto handler = [this, service, round = round_](const proto::Payload& payload) {
-    if (round == round_) on_advertised(service, payload);
-  };
-  if (!requests_.ask_later(proto::Kind::ns, proto::encode(own.request), handler)) return false;
-  own.asked = true;
-  ++under_way_;
-  return true;
+  const bool asked = ask(proto::encode(own.request), [this, service](const proto::Payload& answer) {
+    on_advertised(service, answer);
+  });
+  own.asked |= asked;
+  return asked;
 }
 
 bool Declarations::withdraw_service(const std::string& service, GroupId group) {
-  const auto handler = [this, service, group, round = round_](const proto::Payload& payload) {
-    if (round == round_) on_withdrawn(service, group, payload);
-  };
-  if (!requests_.ask_later(proto::Kind::ns, proto::encode(proto::ns::Withdraw{group}), handler))
-    return false;
-  ++under_way_;
-  return true;
-}
-
-void Declarations::on_withdrawn(const std::string& service, GroupId group,
-                                const proto::Payload& payload) {
-  const auto answer = proto::decode_answer<proto::ns::WithdrawAnswer>(payload);
-  if (answer || answer.error().status == proto::Status::not_found) finish_service(service, group);
-  answered();
+  return ask(proto::encode(proto::ns::Withdraw{group}),
+             [this, service, group](const proto::Payload& payload) {
+               if (is_gone(proto::decode_answer<proto::ns::WithdrawAnswer>(payload)))
+                 finish_service(service, group);
+             });
 }
 
 bool Declarations::declare_subscription(const std::string& full_name) {
@@ -250,30 +259,16 @@ bool Declarations::declare_subscription(const std::string& full_name) {
   const auto found = subscriptions_.find(full_name);
   if (found == subscriptions_.end()) return true;  // ended meanwhile
   if (found->second.ended) return unsubscribe(full_name);
-  const auto handler = [this, full_name, round = round_](const proto::Payload& payload) {
-    if (round == round_) on_subscribed(full_name, payload);
-  };
-  if (!requests_.ask_later(proto::Kind::ns, proto::encode(found->second.request), handler))
-    return false;
-  ++under_way_;
-  return true;
+  return ask(proto::encode(found->second.request),
+             [this, full_name](const proto::Payload& answer) { on_subscribed(full_name, answer); });
 }
 
 bool Declarations::unsubscribe(const std::string& full_name) {
-  const auto handler = [this, full_name, round = round_](const proto::Payload& payload) {
-    if (round == round_) on_unsubscribed(full_name, payload);
-  };
-  if (!requests_.ask_later(proto::Kind::ns, proto::encode(proto::ns::Unsubscribe{full_name}),
-                           handler))
-    return false;
-  ++under_way_;
-  return true;
-}
-
-void Declarations::on_unsubscribed(const std::string& full_name, const proto::Payload& payload) {
-  const auto answer = proto::decode_answer<proto::ns::UnsubscribeAnswer>(payload);
-  if (answer || answer.error().status == proto::Status::not_found) finish_subscription(full_name);
-  answered();
+  return ask(proto::encode(proto::ns::Unsubscribe{full_name}),
+             [this, full_name](const proto::Payload& payload) {
+               if (is_gone(proto::decode_answer<proto::ns::UnsubscribeAnswer>(payload)))
+                 finish_subscription(full_name);
+             });
 }
 
 /// The present groups of the own services that have or had one, and of those of others.
@@ -343,7 +338,6 @@ void Declarations::on_advertised(const std::string& service, const proto::Payloa
     record->incoming.count = answer->subscribers;
     events_.push_back(item_of(record, 0));
   }
-  answered();
 }
 
 bool Declarations::is_subscribed(GroupId group) const {
@@ -388,9 +382,28 @@ void Declarations::on_subscribed(const std::string& full_name, const proto::Payl
     }
     events_.push_back(item_of(record, full_name.size()));
   }
-  answered();
 }
 
-std::vector<Item> Declarations::take_events() { return std::exchange(events_, {}); }
+bool Declarations::may_wait(GroupId group, std::size_t bytes) {
+  // A count that is a moment old is good enough: what came before the program asked may wait.
+  if (subscribing_.load(std::memory_order_relaxed) == 0) {
+    unknown_bytes_ = 0;
+    return true;
+  }
+  const MutexLock lock(mutex_);
+  if (std::ranges::find(answered_, group) != answered_.end() || is_subscribed(group)) return true;
+  if (bytes > kUnknownBytesMax - unknown_bytes_) {
+    ++unknown_lost_;
+    return false;
+  }
+  unknown_bytes_ += bytes;
+  return true;
+}
+
+std::vector<Item> Declarations::take_events() {
+  if (unknown_lost_ != 0 && subscribing_.load(std::memory_order_relaxed) == 0)  // as in may_wait()
+    add_gap(std::exchange(unknown_lost_, 0), proto::DropReason::no_subscriber);
+  return std::exchange(events_, {});
+}
 
 }  // namespace gimnet::nif

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
@@ -61,6 +62,34 @@ class Declarations {
   /// The hub does not have it (any more).
   void finish_subscription(const std::string& full_name) GIMNET_EXCLUDES(mutex_);
 
+  /// Lives while the program waits for the answer to its SUBSCRIBE.
+  class Subscribing {
+   public:
+    explicit Subscribing(Declarations& declarations) : declarations_(declarations) {
+      declarations_.subscribing_.fetch_add(1);
+    }
+    ~Subscribing() {
+      const MutexLock lock(declarations_.mutex_);
+      if (declarations_.subscribing_.fetch_sub(1) == 1) declarations_.answered_.clear();
+    }
+    Subscribing(const Subscribing&) = delete;
+    Subscribing& operator=(const Subscribing&) = delete;
+
+   private:
+    Declarations& declarations_;
+  };
+  /// The hub answered a SUBSCRIBE: messages of that group follow, before the program knows.
+  void on_subscribe_answer(GroupId group) GIMNET_EXCLUDES(mutex_) {
+    const MutexLock lock(mutex_);
+    if (subscribing_.load() != 0) answered_.push_back(group);
+  }
+  /// Of groups that the program has not subscribed so many bytes may wait in the receive queue
+  /// while a SUBSCRIBE is unanswered. Then a full queue cannot keep the answer from being read.
+  static constexpr std::size_t kUnknownBytesMax = 64 * 1024;
+  /// A message of that group and size came. False: it is beyond kUnknownBytesMax; a NIF_GAP tells
+  /// the number of these messages once no SUBSCRIBE is unanswered.
+  [[nodiscard]] bool may_wait(GroupId group, std::size_t bytes) GIMNET_EXCLUDES(mutex_);
+
   /// Why everything is declared again.
   struct Occasion {
     bool anew = false;       ///< a WELCOME that was not `resumed`: counts begin anew
@@ -105,10 +134,6 @@ class Declarations {
       GIMNET_EXCLUDES(mutex_);
   void on_subscribed(const std::string& full_name, const proto::Payload& payload)
       GIMNET_EXCLUDES(mutex_);
-  void on_unsubscribed(const std::string& full_name, const proto::Payload& payload)
-      GIMNET_EXCLUDES(mutex_);
-  void on_withdrawn(const std::string& service, GroupId group, const proto::Payload& payload)
-      GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] bool declare_service(const std::string& service) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] bool withdraw_service(const std::string& service, GroupId group)
       GIMNET_REQUIRES(mutex_);
@@ -116,10 +141,12 @@ class Declarations {
   [[nodiscard]] bool unsubscribe(const std::string& full_name) GIMNET_REQUIRES(mutex_);
   void enter_group(Service& service, GroupId group) GIMNET_REQUIRES(mutex_);
   void end_declaring();
+  void add_gap(std::uint64_t count, proto::DropReason reason);
   [[nodiscard]] SendQueue::GroupMap moves() GIMNET_EXCLUDES(mutex_);
   void bring_last_messages() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] bool is_subscribed(GroupId group) const GIMNET_REQUIRES(mutex_);
-  void answered();
+  /// One of this round's requests. False: it has to wait for a free number.
+  [[nodiscard]] bool ask(const proto::Payload& request, RequestTable::Handler on_answer);
 
   RequestTable& requests_;
   Outbound& outbound_;
@@ -132,6 +159,10 @@ class Declarations {
   /// Count numbers of subscriptions that the program begins. Limit: its threads.
   std::map<std::string, std::uint8_t> beginning_ GIMNET_GUARDED_BY(mutex_);
   std::uint8_t next_number_ GIMNET_GUARDED_BY(mutex_) = 0;
+  /// Groups of which the hub told while a SUBSCRIBE of the program is unanswered. Limit: requests
+  /// that are answered or given up meanwhile.
+  std::vector<GroupId> answered_ GIMNET_GUARDED_BY(mutex_);
+  std::atomic<std::size_t> subscribing_{0};  ///< SUBSCRIBEs for which the program waits
 
   // The library's thread.
   std::deque<std::string> services_due_;       ///< Limit: services_
@@ -140,6 +171,8 @@ class Declarations {
   bool declaring_ = false;
   std::uint64_t round_ = 0;  ///< answers of an earlier connection do not count
   std::vector<Item> events_;
+  std::size_t unknown_bytes_ = 0;   ///< see may_wait()
+  std::uint64_t unknown_lost_ = 0;  ///< messages that it dropped and no event told yet
 };
 
 }  // namespace gimnet::nif

@@ -173,7 +173,7 @@ Inbound::Verdict Inbound::take_message(const proto::FrameView& view, const std::
     counts_.messages_lost += lost;
     add_gap(view.header.src, lost, proto::DropReason::cut_message);
   }
-  add_frame(view, frame);
+  if (may_wait(view.header, view.header.frame_size())) add_frame(view, frame);
   return Verdict::going;
 }
 
@@ -196,8 +196,11 @@ Inbound::Verdict Inbound::take_fragment(const proto::FrameView& view, const std:
       host_.on_message_lost(view.header.dst);
     return Verdict::going;
   }
-  if (reassembled.storage.empty()) {
-    add_frame(view, frame);  // it came in one piece
+  const bool in_one_piece = reassembled.storage.empty();
+  if (!may_wait(view.header, in_one_piece ? view.header.frame_size() : reassembled.storage.size()))
+    return Verdict::going;
+  if (in_one_piece) {
+    add_frame(view, frame);
     return Verdict::going;
   }
   add_whole(view, frame, std::move(reassembled.storage));
@@ -214,6 +217,13 @@ void Inbound::add_whole(const proto::FrameView& view, const std::byte* frame, By
   ++counts_.messages;
   const std::size_t bytes = record->payload.size();
   add_record(record.release(), bytes);
+}
+
+bool Inbound::may_wait(const proto::FrameHeader& header, std::size_t bytes) {
+  if (header.kind != proto::Kind::group || host_.may_wait(header.dst, bytes)) return true;
+  ++counts_.messages_lost;
+  host_.on_message_lost(header.dst);
+  return false;
 }
 
 /// The message pays for its own bytes and for what lies before it in slabs that messages keep: of

@@ -48,6 +48,8 @@ class InboundHost {
   virtual void send_taken(std::uint32_t to, const proto::Taken& taken) = 0;
   /// The tag of a message of that group; 0: it does not count in a window.
   [[nodiscard]] virtual std::uint32_t epoch_for(std::uint32_t group) = 0;
+  /// False: a message of that group with so many bytes is dropped, and told by a NIF_GAP later.
+  [[nodiscard]] virtual bool may_wait(std::uint32_t group, std::size_t bytes) = 0;
   /// A message of that group ended of which the program gets nothing.
   virtual void on_message_lost(std::uint32_t group) = 0;
   /// Takes what was received, in order, and the references.
@@ -127,6 +129,7 @@ class Inbound {
   [[nodiscard]] Verdict take_watch_events(std::span<const std::byte> payload);
   [[nodiscard]] Verdict take_name_lost(std::span<const std::byte> payload);
   [[nodiscard]] Verdict take_report(const proto::FrameView& view);
+  [[nodiscard]] bool may_wait(const proto::FrameHeader& header, std::size_t bytes);
   void add_frame(const proto::FrameView& view, const std::byte* frame);
   /// A message whose payload has memory of its own.
   void add_whole(const proto::FrameView& view, const std::byte* frame, ByteBuffer payload);

@@ -266,6 +266,7 @@ nif_status nif_subscribe_paced(nif_node* node, const char* full_name, const nif_
     }
     ns::SubscribeAnswer answer;
     const Deadline deadline = deadline_after(timeout_ms);
+    const gimnet::nif::Declarations::Subscribing subscribing(found.declarations());
     const auto former = found.declarations().begin_subscription(request);
     bool again = false;
     const nif_status status = declare(found, [&] {

@@ -193,7 +193,10 @@ std::vector<Item> Node::on_answer(proto::Kind kind, const proto::ControlView& an
     store_le(payload.data(), answer.header.operation);
     payload.insert(payload.end(), answer.body.begin(), answer.body.end());
     const auto subscribed = proto::decode_answer<proto::ns::SubscribeAnswer>(payload);
-    if (subscribed) credits_.open(subscribed->group, subscribed->window, subscribed->number);
+    if (subscribed) {
+      credits_.open(subscribed->group, subscribed->window, subscribed->number);
+      declarations_.on_subscribe_answer(subscribed->group);
+    }
   }
   static_cast<void>(requests_.on_answer(kind, answer));
   std::vector<Item> events = declarations_.take_events();

@@ -100,6 +100,9 @@ class Node final : private InboundHost {
   [[nodiscard]] std::uint32_t epoch_for(std::uint32_t group) override {
     return credits_.epoch_for(group);
   }
+  [[nodiscard]] bool may_wait(std::uint32_t group, std::size_t bytes) override {
+    return declarations_.may_wait(GroupId{group}, bytes);
+  }
   void on_message_lost(std::uint32_t group) override {
     credits_.take(group, epoch_for(group), 1, false);
   }

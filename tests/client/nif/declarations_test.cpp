@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
 #include <string>
 #include <thread>
 
@@ -264,6 +265,50 @@ TEST(Declarations, UnsubscribeNothingBehindASubscriptionThatBeginsAnew) {
   }
   asking.join();
   EXPECT_TRUE(anew);
+}
+
+/// From kPeerId, in a frame of so many bytes.
+void send_group(FakeConnection& hub, std::uint32_t group, std::size_t frame_bytes) {
+  proto::FrameParts parts;
+  parts.header.kind = proto::Kind::group;
+  parts.header.src = kPeerId;
+  parts.header.dst = group;
+  hub.send(parts, std::string(frame_bytes - proto::kHeaderSize, 'x'));
+}
+
+TEST(Declarations, LetMessagesOfOtherGroupsWaitUpToALimitWhileTheySubscribe) {
+  constexpr std::uint32_t kOther = kGroup + 1;
+  constexpr std::size_t kFrame = Declarations::kUnknownBytesMax / 8;
+  FakeHub hub;
+  Connected connected = connect_to(hub, default_options("robot"), make_welcome());
+  nif_node* const node = connected.node.get();
+  std::thread subscribing(
+      [node] { EXPECT_EQ(nif_subscribe(node, "peer/scan", nullptr, NIF_FOREVER), NIF_OK); });
+  std::uint16_t number = 0;
+  ASSERT_TRUE(connected.hub.next_request<proto::ns::Subscribe>(number));
+  for (int i = 0; i < 8; ++i) send_group(connected.hub, kOther, kFrame);
+  send_group(connected.hub, kOther, proto::kHeaderSize);  // one beyond
+  proto::ns::SubscribeAnswer answer;
+  answer.group = GroupId{kGroup};
+  connected.hub.send_control(proto::Kind::ns, proto::encode_answer(answer, number));
+  for (int i = 0; i < 9; ++i) send_group(connected.hub, kGroup, kFrame);
+  subscribing.join();
+  send_group(connected.hub, kOther, kFrame);
+  std::map<std::uint32_t, int> messages;
+  std::uint64_t lost = 0;
+  for (int i = 0; i < 8 + 9 + 1 + 1; ++i) {
+    nif_incoming in;
+    ASSERT_EQ(nif_receive(node, &in, NIF_FOREVER), NIF_OK);
+    if (in.type == NIF_MESSAGE) ++messages[in.to];
+    if (in.type == NIF_GAP) {
+      EXPECT_STREQ(in.text, "no_subscriber");
+      lost += in.count;
+    }
+    nif_release(&in);
+  }
+  EXPECT_EQ(messages, (std::map<std::uint32_t, int>{{kGroup, 9}, {kOther, 8 + 1}}));
+  EXPECT_EQ(lost, 1u);
+  EXPECT_EQ(counters_of(node).messages_lost, 1u);
 }
 
 }  // namespace

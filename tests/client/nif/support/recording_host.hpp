@@ -52,6 +52,9 @@ class RecordingHost final : public InboundHost {
   [[nodiscard]] std::uint32_t epoch_for(std::uint32_t group) override {
     return group == counted_group ? 1 : 0;
   }
+  [[nodiscard]] bool may_wait(std::uint32_t group, std::size_t bytes) override {
+    return group != unwanted_group || bytes <= unwanted_bytes_max;
+  }
   void on_message_lost(std::uint32_t group) override { lost_groups.push_back(group); }
   void deliver(std::span<const Item> delivered) override {
     for (const Item& item : delivered) {
@@ -79,7 +82,9 @@ class RecordingHost final : public InboundHost {
   std::vector<std::uint16_t> answers;
   std::vector<std::uint32_t> lost_groups;
   bool moved_is_news = true;
-  std::uint32_t counted_group = 0;  ///< its messages count in a window
+  std::uint32_t counted_group = 0;     ///< its messages count in a window
+  std::uint32_t unwanted_group = 0;    ///< its messages may not wait ...
+  std::size_t unwanted_bytes_max = 0;  ///< ... if they have more bytes
   std::string lost_name;
   std::optional<ReportedMessages::Start> start;  ///< of the message that reports are about
   std::vector<proto::Taken> taken_sent;
