@@ -8,8 +8,8 @@
 
 namespace gimnet::hub {
 
-/// What a shard counts while it works, as plain integers; publish() adds them to the counters that
-/// others read, once a turn. Thread safety: one shard.
+/// The counts of a shard while it works, as plain integers. publish() adds them to the counters
+/// that others read, once a turn. Thread safety: one shard.
 struct Tally {
   std::uint64_t accepted = 0;
   std::uint64_t copies = 0;

@@ -167,7 +167,7 @@ std::uint64_t Attacher::resume_bytes(const Connection& connection) const {
   return connection.is_link() ? kLinkResumeBytes : state_.limits.resume_bytes;
 }
 
-/// What was on its way to the subscriber is lost, and both ends count its messages from 0.
+/// Messages on their way to the subscriber are lost, and both ends count from 0.
 void Attacher::count_anew(Connection& connection) {
   if (!connection.paced) return;
   state_.pacer.on_new_epoch(connection);

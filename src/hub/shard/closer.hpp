@@ -6,7 +6,7 @@
 
 namespace gimnet::hub {
 
-/// How connections and sessions of a shard end. Thread safety: one shard.
+/// Ends connections and sessions of a shard. Thread safety: one shard.
 class Closer {
  public:
   explicit Closer(ShardState& state) : state_(state) {}
@@ -23,10 +23,10 @@ class Closer {
   /// A newer connection of the same session is there: the old one is told `replaced`, the conductor
   /// knows.
   void fence(Connection& connection);
-  /// What the connection's peer did not say that it took is lost, and each sender is told that
-  /// asked for it. `partial`: a frame that was written in part, or none.
+  /// Loses the frames that the peer did not confirm. Each sender that asked for reports is told.
+  /// `partial`: a frame that was written in part, or none.
   void lose_unconfirmed(Connection& connection, const Run& partial);
-  /// What waits for the session, and what it did not confirm, is lost.
+  /// Loses the frames that wait for the session and those that it did not confirm.
   void lose_all(Connection& connection);
   /// The session is over.
   void release(SessionRef session);
@@ -35,7 +35,7 @@ class Closer {
   [[nodiscard]] bool say_goodbye(Connection& connection, proto::GoodbyeCode code,
                                  const std::string& sentence);
   void detach(Connection& connection, bool said_goodbye);
-  /// What was read of it and not routed yet is not routed any more.
+  /// Drops the bytes that were read and not routed yet.
   void give_up_rest(Connection& connection);
   void tell(const Connection& connection, bool said_by_peer, proto::GoodbyeCode code,
             std::string sentence);

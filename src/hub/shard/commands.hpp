@@ -78,7 +78,7 @@ struct AttachCommand {
   /// All of WELCOME but what the shard puts in: resumed, and for a session that can resume taken,
   /// epoch and resume_buffer_bytes.
   proto::Welcome welcome;
-  /// What HELLO said of resume: wanted, epochs, count, buffer.
+  /// The words of HELLO on resume: wanted, epochs, count, buffer.
   bool resume_wanted = false;
   std::uint64_t peer_epoch = 0;
   std::uint64_t known_hub_epoch = 0;
@@ -125,9 +125,9 @@ struct TellCommand {
   std::vector<std::byte> frame;  ///< to node 0: set_destination() for each of them
 };
 
-/// What a connection missed since events for it were dropped, as it is now: control frames, ahead
-/// of all that waits for it, whatever their size. Events are for it again from here on. Nothing if
-/// `attachment` is not the present one.
+/// Tells a connection the present state of everything whose events it missed: control frames, ahead
+/// of all that waits for it, whatever their size. From here on it gets events again. Does nothing
+/// if `attachment` is not the present one.
 struct TellAgainCommand {
   SessionRef session;
   std::uint32_t attachment = 0;
@@ -188,7 +188,7 @@ struct LinkClockCommand {
   std::chrono::nanoseconds ahead{};
 };
 
-/// What the shard goes by from its next turn on.
+/// The limits that the shard obeys from its next turn on.
 struct LimitsCommand {
   Limits limits;
 };

@@ -90,7 +90,7 @@ class Backoff {
   std::uint8_t left_ = 7;  ///< times that it is not worth it
 };
 
-/// What outlives a broken connection, so that the next one can go on where it ended
+/// The state that outlives a broken connection, so that the next one can go on where it ended
 /// (docs/protocol.md, section 3).
 struct ResumeState {
   explicit ResumeState(std::uint64_t bytes_max) : kept(bytes_max) {}
@@ -108,7 +108,7 @@ struct ResumeState {
 struct LinkPeer {
   LinkRule rule;
   std::uint32_t silent_ms = 0;
-  /// How far the clock of the hub there is ahead of this hub's; nothing: not measured yet.
+  /// The clock of the hub there is ahead of this hub's by so much; nothing: not measured yet.
   std::optional<std::int64_t> clock_ahead_ns{};
   TokenBucket control{};  ///< frames for the conductor
 };
@@ -116,7 +116,7 @@ struct LinkPeer {
 /// A bit set of shards: any of them.
 inline constexpr std::uint64_t kAllShards = ~std::uint64_t{0};
 
-/// How a recipient that does not take everything at once gets on.
+/// The progress of a recipient that does not take everything at once.
 struct Progress {
   std::uint64_t taken_bytes = 0;  ///< that left the send queue, when last looked at
   std::uint64_t since_ms = 0;     ///< it has taken less than the least since then

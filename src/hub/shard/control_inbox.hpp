@@ -12,9 +12,9 @@
 
 namespace gimnet::hub {
 
-/// What shards hand to the conductor: control frames and the ends of connections. Never on the data
-/// path. Thread safety: push() from each shard's thread with that shard's index; the rest from the
-/// conductor.
+/// The door from the shards to the conductor, for control frames and the ends of connections. Never
+/// on the data path. Thread safety: push() from each shard's thread with that shard's index; the
+/// rest from the conductor.
 class ControlInbox {
  public:
   explicit ControlInbox(std::size_t shards) : queue_(shards), pushed_(shards), taken_(shards) {}
@@ -47,7 +47,7 @@ class ControlInbox {
       }
     }
   }
-  /// What the conductor takes at a time, before it lets others have a turn.
+  /// The conductor takes so many at a time, before it lets others have a turn.
   static constexpr std::size_t kEventsABatch = 256;
   /// Conductor: its descriptor becomes readable at push() after prepare_to_sleep().
   [[nodiscard]] Waker& waker() { return waker_; }

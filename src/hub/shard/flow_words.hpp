@@ -6,7 +6,7 @@
 #include "hub/shard/shard_state.hpp"
 #include "proto/frame/flow.hpp"
 
-// What a shard says by FLOW frames to the peer of a connection. Thread safety: one shard.
+// The FLOW frames that a shard sends to the peer of a connection. Thread safety: one shard.
 
 namespace gimnet::hub {
 

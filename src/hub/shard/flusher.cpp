@@ -9,9 +9,9 @@
 namespace gimnet::hub {
 namespace {
 
-/// What may wait unsent in the kernel on a connection that does not take everything at once:
-/// unsent_ms at its measured rate, at least so much, at most unsent_bytes (docs/architecture.md,
-/// "Freshness").
+/// The least that may wait unsent in the kernel on a connection that does not take everything at
+/// once. More is allowed at its measured rate (unsent_ms), up to unsent_bytes
+/// (docs/architecture.md, "Freshness").
 constexpr std::uint64_t kUnsentBytesMin = 4 * 1024;
 constexpr std::uint64_t kRateWindowMs = 200;
 /// Above this rate what waits in the kernel is gone in a moment, and bounding it costs a quarter of
@@ -99,8 +99,8 @@ void Flusher::ask_to_be_told(Connection& connection) {
                                                         connection.node}});
 }
 
-/// What was not written stays: for a transport that takes no more, for a confirmation, or for the
-/// node to come back.
+/// Frames that were not written stay: for a transport that takes no more, for a confirmation, or
+/// for the node to come back.
 void Flusher::let_wait(Connection& connection) {
   connection.outbox.settle(state_.egress);
   connection.outbox.signal_room(state_.egress);
@@ -180,15 +180,15 @@ void Flusher::look_after(Connection& connection) {
   // away.
   if (connection.write == WriteState::failed && connection.waits_when_away) return;
   Progress& progress = *connection.progress;
-  // Where messages were dropped because it took nothing, an empty queue does not say that it has
-  // caught up.
+  // An empty queue does not say that it has caught up if messages were dropped because it took
+  // nothing.
   const bool caught_up = taken_bytes(connection) >= progress.owed_bytes;
   if (connection.outbox.empty() && !connection.writer.in_frame() && caught_up) {
     end_watch(connection);
     return;
   }
-  // What the kernel calls unsent counts its own bookkeeping on some transports: never less than
-  // before.
+  // On some transports the kernel counts its own bookkeeping as unsent, so the difference may
+  // shrink: never take less than before.
   const std::uint64_t taken = std::max(taken_bytes(connection), progress.rate_bytes);
   adapt_unsent_limit(connection, taken);
   // The hub's own words (PING, PONG, CONFIRM) may pass while data does not.

@@ -5,9 +5,9 @@
 
 namespace gimnet::hub {
 
-/// What may wait unsent in the kernel on a connection of which nothing is known yet. A fast one
-/// loses nothing by it that could be felt, and behind a slow one the first real-time message has
-/// little to wait for.
+/// So much may wait unsent in the kernel on a connection of which nothing is known yet. A fast
+/// connection does not become slower by it. On a slow one the first real-time message has little to
+/// wait for.
 inline constexpr std::uint32_t kFirstUnsentBytes = 64 * 1024;
 
 /// Writes what the turn left in outboxes, once per connection, and looks after those that do not

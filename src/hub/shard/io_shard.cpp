@@ -157,8 +157,8 @@ void IoShard::take_mail() {
   const auto before_taking = [this] {
     while (!commands_.empty()) take_commands();
   };
-  // What waits is counted against the budget when it is flushed: a mailbox full of the smallest
-  // frames would go far beyond it before that.
+  // Waiting frames are charged to the budget when they are flushed. A mailbox full of the smallest
+  // frames would go far beyond the budget before that.
   std::uint64_t unflushed = 0;
   mailbox.drain(kMailPerTurn, before_taking, [&](const Mail& mail) {
     const bool goes_on = reader_.take_mail(mail);

@@ -19,7 +19,7 @@ namespace gimnet::hub {
 /// and join() from who made it; the rest is the shard's own thread.
 class IoShard {
  public:
-  /// How the thread waits for work.
+  /// The thread's way to wait for work.
   struct Options {
     bool spin = false;  ///< never sleep: less latency for a whole CPU
   };
@@ -49,7 +49,7 @@ class IoShard {
   /// Mailbox entries and commands that one turn takes.
   static constexpr std::size_t kMailPerTurn = 1024;
   static constexpr std::size_t kCommandsPerTurn = 256;
-  /// What is read before it is written: more would leave the cache.
+  /// So much is read before it is written: more would leave the cache.
   static constexpr std::uint64_t kReadBytesPerFlush = 256 * 1024;
 
   void run();

@@ -43,8 +43,8 @@ bool Keeper::is_silent(Connection& connection) {
     return state_.now_ms - connection.last_heard_ms >= silent_ms(connection);
   };
   if (!over()) return false;
-  // What it said may lie unread: the hub stood still, the wait for who is ready was interrupted, or
-  // more were ready than are told at a time.
+  // Its words may lie unread: the hub stood still, epoll_wait was interrupted, or more connections
+  // were ready than it tells at a time.
   reader_.read(connection);
   return connection.connected && !connection.gate.has(ReadGate::no_room) && over();
 }
@@ -70,8 +70,8 @@ void Keeper::look_at(Connection& connection) {
   }
   if (connection.is_link() && connection.write == WriteState::failed)
     return closer_.on_broken(connection);
-  // What a peer sent before it was gone waits for who holds it, but no longer than its session
-  // would wait for the peer: it may be held by what waits for itself, and would be for ever.
+  // Frames that a peer sent before it was gone wait for whoever holds it, but no longer than its
+  // session waits for the peer. A peer that is held by its own outbox would wait for ever.
   if (connection.write == WriteState::failed &&
       state_.now_ms - connection.last_heard_ms >= std::max(limits.grace_ms, limits.silent_ms)) {
     return closer_.on_broken(connection);

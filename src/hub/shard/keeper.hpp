@@ -7,7 +7,7 @@
 
 namespace gimnet::hub {
 
-/// What a shard does by the clock: keep-alive, silent and stalled peers, slow ones, messages that
+/// Does a shard's work by the clock: keep-alive, silent and stalled peers, slow ones, messages that
 /// waited too long. Time in which the shard itself stood still counts against nobody. Thread
 /// safety: one shard.
 class Keeper {

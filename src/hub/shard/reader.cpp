@@ -13,8 +13,8 @@
 namespace gimnet::hub {
 namespace {
 
-/// Where a newcomer sends to shows when it is read: so much of it, also where some shard has too
-/// much to do.
+/// A newcomer's destinations show only when it is read: so much of it is read, even if some shard
+/// has too much to do.
 constexpr std::uint64_t kFirstReadBytes = 4 * 1024;
 
 template <class Word>
@@ -302,7 +302,7 @@ void Reader::on_confirm(Connection& connection, const proto::flow::Confirm& conf
 
 bool Reader::on_skip(Connection& connection, const proto::flow::Skip& skip) {
   if (!connection.resume || skip.count == proto::flow::kSkipUnknown) return true;
-  // What stands before it may not have been taken, nor may it be confirmed with it.
+  // The frames before it may not have been taken, so they must not be confirmed with it.
   if (connection.gate.has(ReadGate::draining)) return true;
   std::uint64_t& taken = connection.resume->taken;
   if (skip.count > UINT64_MAX - 1 - std::min(taken, UINT64_MAX - 1)) {

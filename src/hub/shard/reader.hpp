@@ -22,7 +22,7 @@ class Reader {
   void go_on(Connection& connection);
   /// Mail has a turn's share too, that of all shards together.
   void begin_mail();
-  /// What was left of the mail before. Returns false once the share is used up.
+  /// Goes on with the mail that an earlier turn left. Returns false once the share is used up.
   [[nodiscard]] bool take_rest_of_mail();
   /// The same with frames or a word from another shard; frames that are too many are left.
   /// REQUIRES: none are left.
@@ -60,7 +60,7 @@ class Reader {
   /// before. False: nobody is left to go.
   [[nodiscard]] bool keep(Connection& connection, std::span<const std::byte> begun,
                           std::uint32_t needed);
-  /// Who began its frame longest ago, and before this one; nullptr: nobody.
+  /// The connection that began its frame longest ago, and before this one; nullptr: none.
   [[nodiscard]] Connection* begun_before(const Connection& connection) const;
   /// May shorten `view` to the frames that it handled.
   [[nodiscard]] bool handle_run(Connection& connection, proto::NextRun& found);

@@ -14,14 +14,14 @@ inline constexpr std::size_t kSmallReadBytes = 16 * 1024;
 /// So often more is read behind a small read.
 inline constexpr int kReadsMore = 4;
 
-/// What follows in the same room. An end or an error shows again at the next read.
+/// Reads what follows into the rest of the room. An end or an error shows again at the next read.
 [[nodiscard]] std::size_t receive_more(Connection& connection, std::span<std::byte> room,
                                        Tally& tally);
 
-/// What is there, and behind a small read what came meanwhile, where that is often the case: who
-/// writes message by message has written the next one while the first was read, and both then leave
-/// in one write, which is what a message costs (docs/why-these-figures.md). REQUIRES: `room`
-/// is not empty. Thread safety: one shard.
+/// Reads, and after a small read reads again if that often finds more. A sender that writes message
+/// by message has written the next one while the first was read. Both then leave in one write, and
+/// a message costs mostly its write (docs/why-these-figures.md). REQUIRES: `room` is not empty.
+/// Thread safety: one shard.
 [[nodiscard]] inline net::IoResult receive_repeatedly(Connection& connection,
                                                       std::span<std::byte> room, Tally& tally) {
   net::IoResult result = connection.transport->receive(room);

@@ -26,8 +26,8 @@
 
 namespace gimnet::hub {
 
-/// What all shards of a hub share. Thread safety: immutable, but for what says otherwise. Lifetime:
-/// longer than any shard.
+/// The parts that all shards of a hub share. Thread safety: immutable, apart from members that say
+/// otherwise. Lifetime: longer than any shard.
 struct HubShared {
   HubId hub;
   const Limits& limits;

@@ -11,9 +11,9 @@
 
 namespace gimnet::hub {
 
-/// Where every frame that is not delivered ends: counted by reason, and, where its sender asked for
-/// it, remembered for a REPORT. Reports for one sender and reason are merged until they are due.
-/// Thread safety: one shard.
+/// Counts every frame that is not delivered, by reason, and remembers it for a REPORT if its sender
+/// asked for one. Reports for one sender and reason are merged until they are due. Thread safety:
+/// one shard.
 class DropBook {
  public:
   /// interval_ms: the shortest time between two reports to one sender for one reason.
@@ -22,16 +22,15 @@ class DropBook {
   DropBook(Tally& tally, std::uint64_t interval_ms, std::uint64_t notes_max)
       : tally_(tally), interval_ms_(interval_ms), notes_max_(notes_max) {}
 
-  /// `frames` with one header but for the length. A REPORT shows the one at `start`: of what
-  /// follows its header only that need be there.
+  /// Counts `frames` that have one header, apart from the length. A REPORT shows the one at
+  /// `start`; of the others no byte need be there.
   void drop(const std::byte* start, std::uint32_t frames, proto::DropReason reason);
 
   /// The same for frames with any headers.
   void drop_mixed(const std::byte* first, std::uint32_t size, proto::DropReason reason);
 
-  /// A frame that is delivered, and of which its sender has to know something all the same: it gets
-  /// a REPORT, whether it asked for reports or not. Nothing is counted. Of a group frame reports
-  /// are merged for each group.
+  /// Reports on a frame that is delivered, whether its sender asked for reports or not. Nothing is
+  /// counted. Reports on group frames are merged for each group.
   void tell(const std::byte* frame, proto::DropReason reason) { remember(frame, 1, reason); }
 
   /// Of a frame that is dropped its sender is told.

@@ -15,9 +15,8 @@
 
 namespace gimnet::hub {
 
-/// The owner of an object that belongs to one thread, which calls check_here() wherever it is
-/// entered. Debug builds abort where another thread comes in; release builds check nothing. Thread
-/// safety: none, which is the thing that it finds out.
+/// The thread that owns an object. The object calls check_here() wherever it is entered. Debug
+/// builds abort if another thread comes in; release builds check nothing. Thread safety: none.
 class OwnerThread {
  public:
   /// The first that comes is the owner.
@@ -42,8 +41,8 @@ class OwnerThread {
 #endif
 };
 
-/// How an outbox reaches the senders that fill it, on whatever shard they are. Called only when a
-/// queue is full or has room again, never per frame.
+/// Reaches the senders that fill an outbox, on whatever shard they are. Called only when a queue is
+/// full or has room again, never per frame.
 class SenderSignals {
  public:
   virtual ~SenderSignals() = default;
@@ -55,7 +54,7 @@ class SenderSignals {
   virtual void release(NodeId sender) = 0;
 };
 
-/// What all outboxes of a shard share. Thread safety: one shard.
+/// The parts that all outboxes of a shard share. Thread safety: one shard.
 struct EgressContext {
   const Limits& limits;
   BufferPool& pool;

@@ -8,7 +8,7 @@
 
 namespace gimnet::hub {
 
-/// What waits in a lane: a run of whole messages, or the fragments of one message. All its frames
+/// An element of a lane: a run of whole messages, or the fragments of one message. All its frames
 /// have the same dst, src, kind, flags and lane.
 struct Entry {
   Run run;

@@ -84,7 +84,7 @@ void GatherWriter::gather(Batch& batch, Job& job) {
   RingQueue<Run>& replay = job.outbox.replay();
   if (!replay.empty()) {
     gather_queue(batch, Source::replay, replay, job);
-    // What the peer missed comes before anything newer.
+    // Frames that the peer missed come before anything newer.
     return;
   }
   gather_lanes(batch, job);
@@ -265,7 +265,7 @@ std::uint32_t GatherWriter::consume_run(Run& run, std::size_t bytes, bool contro
     partial_.control = control;
     partial_.shared = shared;
     left += partial_.run.size;
-    // What was begun stays until the transport takes the rest.
+    // A frame that was begun stays until the transport takes the rest.
     job.outbox.settle_run(partial_.run, shared, job.context);
   }
   if (whole.frames != 0) finish(std::move(whole), control, shared, job);

@@ -44,7 +44,7 @@ class GatherWriter {
   static constexpr std::size_t kBatchBytes = 256 * 1024;
   static constexpr int kBatchesPerTurn = 4;
 
-  /// Where a piece of a batch came from.
+  /// The origin of a piece of a batch.
   enum class Source : std::uint8_t { partial, control, replay, lane0, lane1, lane2, lane3 };
   struct Pick {
     Source source;
@@ -90,7 +90,8 @@ class GatherWriter {
                                                Outbox& outbox);
   static void owe(std::size_t lane, std::uint32_t bytes,
                   std::array<LaneCursor, proto::kLaneCount>& cursors, Outbox& outbox);
-  /// How much of the run may be written: all of it, or what fits in the resume buffer.
+  /// The bytes of the run that may be written: all of it, or as much as the resume buffer has room
+  /// for.
   [[nodiscard]] static std::uint32_t allowed(const Run& run, std::size_t planned, Job& job);
 
   void consume(const Batch& batch, std::size_t bytes, Job& job);

@@ -100,9 +100,9 @@ Entry Outbox::make_entry(const Run& run, const proto::FrameHeader& header, Hando
                          bool has_room, EgressContext& context) {
   Entry entry;
   entry.extended = header.has(proto::kFlagExt);
-  // What is likely to be refused is not copied: it would fill a chunk that others keep. What stays
-  // of it is, at the turn's end. An extension may be a TRACE, which each recipient gets filled in
-  // on its own.
+  // Frames that will probably be refused are not copied: they would fill a chunk that others keep.
+  // Those that stay are copied at the turn's end. An extension may be a TRACE, which each recipient
+  // gets filled in on its own.
   const bool by_copy =
       (run.size < kAppendBytesMax && !handover.fan_out && has_room) || entry.extended;
   entry.run = by_copy ? copy(run, context) : run.share();

@@ -42,16 +42,16 @@ class UntoldLosses {
   proto::DropReason reason_ = proto::DropReason::none;
 };
 
-/// How a run came to an outbox.
+/// The way of a run into an outbox.
 struct Handover {
   bool fan_out = false;  ///< the same bytes go to many: keep a reference instead of a copy
 };
 
-/// What waits to be written to one connection: control frames, and four lanes of messages, with the
-/// policies of docs/protocol.md, section 5. While the connection takes everything at once, push()
-/// is a few instructions: policies begin when something waits. A connection that only keeps alive
-/// has nothing but its control frames; what data needs is made for the first of it. Thread safety:
-/// one shard. Ownership: references to buffers.
+/// The frames that wait to be written to one connection: control frames, and four lanes of messages
+/// with the policies of docs/protocol.md, section 5. While the connection takes everything at once,
+/// push() is a few instructions: policies begin when something waits. A connection that only keeps
+/// alive has no lanes; they are made for its first data frame. Thread safety: one shard. Ownership:
+/// references to buffers.
 class Outbox {
  public:
   Outbox() = default;
@@ -90,16 +90,15 @@ class Outbox {
   /// The same with another limit on what waits.
   [[nodiscard]] bool push_control(std::span<const std::byte> frame, EgressContext& context,
                                   std::uint64_t bytes_most);
-  /// What a new connection is to get ahead of all else, whatever its size: frames as push_control()
-  /// takes them. They do not count against the limit on those, or a peer that came back to much
-  /// could ask for nothing.
+  /// Puts frames as push_control() takes them ahead of all else, whatever their size. They do not
+  /// count against the limit on control frames: a peer that comes back to much news must still be
+  /// able to ask.
   void push_first_control(std::span<const std::byte> frames, EgressContext& context);
 
-  /// Who is told of messages of counted groups that are dropped here; nullptr: nobody.
+  /// Is told of messages of counted groups that are dropped here; nullptr: nobody is.
   void set_counted_groups(CountedGroups* counted) { counted_ = counted; }
   [[nodiscard]] const CountedGroups* counted_groups() const { return counted_; }
-  /// Where it is counted what of the session's frames came to what; nullptr: nowhere. Valid until:
-  /// as SessionGauges.
+  /// Counters of this session (accepted, delivered, dropped). Valid until: as SessionGauges.
   void set_counters(SessionCounters& counters) { counters_ = &counters; }
   [[nodiscard]] SessionCounters* counters() const { return counters_; }
   /// So many frames that were for this connection are dropped, here or on their way here.
@@ -205,7 +204,7 @@ class Outbox {
     proto::FragmentStream stream;
     std::uint32_t number = 0;
   };
-  /// What data frames need.
+  /// The part that only data frames need.
   struct Lanes {
     OpenRun open;  ///< first, with all that append() looks at
     std::array<LaneQueue, proto::kLaneCount> queues;
@@ -226,8 +225,8 @@ class Outbox {
   /// with most of them loses the oldest: a sender that never ends its messages takes no place of
   /// others.
   static constexpr std::size_t kOpenMessagesMax = 256;
-  /// A sender that is held may be read all the same (its own CONFIRM is waited for), and need not
-  /// pause: beyond so many reserves its messages are dropped, BLOCK or not.
+  /// A sender that is held may still be read, because its own CONFIRM is waited for, and it may
+  /// ignore PAUSE. Beyond so many reserves its messages are dropped, with or without BLOCK.
   static constexpr std::uint64_t kReservesMax = 8;
   /// A waiting piece below this is copied out of its slab, which it would keep from being used
   /// again.

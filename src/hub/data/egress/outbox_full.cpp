@@ -4,8 +4,7 @@
 
 #include "hub/data/egress/outbox.hpp"
 
-// What becomes of a message where something waits already: the policies of docs/protocol.md,
-// section 5.
+// The policies of docs/protocol.md, section 5, for a message that finds others waiting.
 
 namespace gimnet::hub {
 

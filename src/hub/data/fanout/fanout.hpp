@@ -12,8 +12,8 @@
 namespace gimnet::hub {
 
 inline constexpr std::uint32_t kNodeIdBytes = 4;
-/// Where the frame for the recipients begins in a LIST frame that another shard gets with so many
-/// ids (Fanout::copy_for).
+/// The offset of the recipients' frame in a LIST frame that another shard gets with so many ids
+/// (Fanout::copy_for).
 [[nodiscard]] constexpr std::uint32_t list_frame_offset(std::uint32_t ids) {
   return proto::kHeaderSize + kNodeIdBytes * ids;
 }
@@ -71,7 +71,7 @@ class Fanout {
   /// Frames below this are cheaper to copy than to give an entry of their own.
   static constexpr std::uint32_t kGatherBytesMax = 4096;
 
-  /// What goes to one other shard in this burst and may still grow.
+  /// The frames that go to one other shard in this burst. It may still grow.
   struct Stretch {
     Run open;         ///< one behind the other; none: nothing was handed over since the last post()
     BufferRef chunk;  ///< where those are put together that lay apart

@@ -40,8 +40,8 @@ struct GroupStart {
   NodeId provider;  ///< whose shard was asked
 };
 
-/// What one shard hands to another: a stretch of a slab with whole frames, once per burst, or a
-/// word about a sender.
+/// An entry that one shard hands to another: a stretch of a slab with whole frames, once per burst,
+/// or a word about a sender.
 struct Mail {
   MailKind kind = MailKind::frames;
   std::uint8_t small_size = 0;
@@ -116,7 +116,7 @@ class Mailbox {
     std::uint8_t from = 0;
     Mail mail;
   };
-  /// What is between one sender and this receiver; each half on its own cache line.
+  /// The queue between one sender and this receiver; each half lies on its own cache line.
   struct Pair {
     // The sender's
     alignas(64) std::uint64_t sent_entries = 0;
@@ -142,7 +142,7 @@ class Mailbox {
         pair.taken_deliveries.load(std::memory_order_relaxed) + mail.deliveries();
     pair.taken_deliveries.store(deliveries, std::memory_order_relaxed);  // relaxed: as above
   }
-  /// What `take` says: go on?
+  /// The answer of `take`: go on?
   template <class Take>
   [[nodiscard]] bool take_one(const Letter& letter, Take& take);
   [[nodiscard]] static bool over(const Pair& pair, std::uint64_t entries, std::uint64_t bytes);

@@ -11,7 +11,7 @@ namespace gimnet::hub {
 
 struct Recipient;
 
-/// What a subscriber gets of a service at most.
+/// The limits of what a subscriber gets of a service.
 struct PaceTerms {
   std::uint32_t window = 0;       ///< messages that it has not credited; 0: any number
   std::uint32_t depth = 1;        ///< newest messages that are held for it
@@ -36,8 +36,8 @@ class PacedSubscription {
   [[nodiscard]] Recipient& recipient() const { return recipient_; }
   [[nodiscard]] GroupId group() const { return group_; }
   [[nodiscard]] const PaceTerms& terms() const { return terms_; }
-  /// What is held stays, even if it is more than the new depth. A new interval counts from the
-  /// message that began last.
+  /// Messages that are held stay, even if they are more than the new depth. A new interval counts
+  /// from the message that began last.
   void set_terms(const PaceTerms& terms);
 
   // ---- the window and the clock

@@ -29,7 +29,7 @@ PacedSubscription& Pacer::subscribe(Recipient& recipient, GroupId group, const P
     unschedule(*known);  // it may be due earlier now
     known->set_terms(terms);
   }
-  // What may go now is not too much, however little may be held from now on.
+  // Messages that may go now need not be held, so the new depth does not drop them.
   release(*known);
   while (known->held() > known->terms().depth) drop_oldest(*known, DropReason::replaced);
   return *known;
@@ -108,7 +108,7 @@ void Pacer::offer_plain(PacedSubscription& subscription, const Run& run,
   Run rest = run.share();
   const Outbox& outbox = subscription.recipient().outbox;
   const std::size_t lane = header.lane & proto::kLaneMask;
-  // What is lost at once of those that went makes room for more.
+  // Messages that were released and lost at once make room for more.
   while (rest.frames != 0 && subscription.held() == 0 && subscription.may_begin(now_us())) {
     // A full outbox refuses them, and would refuse each of a long run by itself.
     if (header.policy() == proto::Policy::drop &&
@@ -358,7 +358,7 @@ void Pacer::forget(Recipient& recipient) {
 
 void Pacer::release_due() {
   while (!ripe_.empty()) {
-    // What is let go may be lost at once, and make others ripe.
+    // A message that is released may be lost at once, which makes others ripe.
     std::swap(ripe_, ripe_now_);
     for (PacedSubscription* each : ripe_now_) each->ripe = false;
     for (PacedSubscription* each : ripe_now_) release(*each);

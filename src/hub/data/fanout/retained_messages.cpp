@@ -204,7 +204,7 @@ void RetainedMessages::renumber_provider(NodeId former, NodeId provider) {
   for (auto found = shares_.find(former.value()); found != shares_.end();
        found = shares_.find(former.value())) {
     Entry& entry = *found->second.first;
-    // What had begun to come does not go on.
+    // A message that had begun to come does not go on.
     for (Arriving& each : entry.arriving) {
       each.open = false;
       let_go(entry, each.kept);
@@ -230,7 +230,7 @@ void RetainedMessages::rename_source(KeptMessage& message, NodeId source) {
 }
 
 void RetainedMessages::on_start_wanted(const GroupStart& start) {
-  // What was routed before this moment is under way before the start.
+  // Frames that were routed before this moment are under way before the start.
   fanout_.post_all();
   if (start.shard == fanout_.self()) {
     on_start(start);
@@ -238,7 +238,7 @@ void RetainedMessages::on_start_wanted(const GroupStart& start) {
     fanout_.post_word(start.shard, mail_about(MailKind::start, start));
   }
   const auto found = entries_.find(start.group.value());
-  // What is kept may be of a former provider on this shard.
+  // The kept message may be of a former provider on this shard.
   if (found == entries_.end() || found->second->provider != start.provider) return;
   hand(start, found->second->last.message);
   for (const Arriving& arriving : found->second->arriving) hand(start, arriving.kept.message);

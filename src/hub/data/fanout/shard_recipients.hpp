@@ -8,8 +8,9 @@
 
 namespace gimnet::hub {
 
-/// How many recipients a frame for another shard has there: what it counts as where that shard
-/// never gets it. Thread safety: one shard; the tables are published by the conductor.
+/// Counts the recipients that a frame for another shard has there. If that shard never gets the
+/// frame, it counts as so many dropped frames. Thread safety: one shard; the tables are published
+/// by the conductor.
 class ShardRecipients {
  public:
   ShardRecipients(const NodeTable& nodes, const GroupTable& groups)

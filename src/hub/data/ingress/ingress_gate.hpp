@@ -50,7 +50,7 @@ class RealTimeMessages {
   std::size_t next_ = 0;  ///< whose place the next one gets: all are taken in turns
 };
 
-/// What is to be done with frames that a connection sent.
+/// The gate's decision on frames that a connection sent.
 enum class Admission : std::uint8_t {
   data,          ///< kinds 0 to 15 but FLOW: to the router
   flow,          ///< FLOW, for this connection
@@ -69,7 +69,7 @@ struct LinkRule {
   [[nodiscard]] bool allows(HubId source) const;
 };
 
-/// What the gate remembers of one connection. Thread safety: one shard.
+/// The gate's memory of one connection. Thread safety: one shard.
 struct IngressState {
   /// Of a plain UNICAST frame in lane 1, which is always legal.
   static constexpr std::uint32_t kPlainUnicast = 1u << 24;

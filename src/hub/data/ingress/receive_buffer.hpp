@@ -10,8 +10,8 @@
 namespace gimnet::hub {
 
 /// The frame that a connection has begun and not finished, or the rest of a read: whole frames that
-/// wait for their turn. Lies in a buffer that the connection then has for itself, or, when little
-/// of it is there, in a copy.
+/// wait for their turn. It lies in a buffer that only this connection uses, or, if it is short, in
+/// a copy.
 struct FrameTail {
   BufferRef buffer;
   std::uint32_t begin = 0;
@@ -24,18 +24,18 @@ struct FrameTail {
   [[nodiscard]] bool is_rest() const { return size != 0 && needed == 0; }
 };
 
-/// Where the connections of a shard read into: one slab for all of them, rewound while nobody keeps
-/// a reference, so that it stays in the cache. A large frame that ends in a later read stays where
-/// it began, and its connection goes on reading behind it: no payload byte is moved. Where many are
-/// begun at a time, whose senders then are slow, each further one moves into memory of its own
-/// size, once. Thread safety: one shard.
+/// The memory that the connections of a shard read into: one slab for all of them. It is rewound
+/// while nobody keeps a reference, so it stays in the cache. A large frame that ends in a later
+/// read stays where it began, and its connection goes on reading behind it: no payload byte is
+/// moved. If many large frames are begun at a time, their senders are slow. Then each further frame
+/// moves once into memory of its own size. Thread safety: one shard.
 class ReceiveBuffer {
  public:
   /// tail_bytes_max: what all begun frames together may keep.
   ReceiveBuffer(BufferPool& pool, Tally& tally, std::uint64_t tail_bytes_max)
       : pool_(pool), tally_(tally), tail_bytes_max_(tail_bytes_max) {}
 
-  /// Where the connection with that tail reads next.
+  /// The memory for the next read of the connection with that tail.
   [[nodiscard]] std::span<std::byte> prepare(FrameTail& tail);
 
   struct Received {

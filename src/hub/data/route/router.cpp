@@ -281,7 +281,7 @@ void Router::to_list(const Run& run, const proto::FrameHeader& header) {
   settle(run, outcomes);
 }
 
-/// What Fanout::copy_for() made on another shard.
+/// Routes a LIST frame that Fanout::copy_for() made on another shard.
 void Router::to_listed_here(const Run& run, const proto::FrameHeader& header) {
   const proto::ListIds ids(run.bytes + proto::kHeaderSize, header.dst);
   Run frame = run.share();

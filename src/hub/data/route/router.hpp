@@ -65,8 +65,9 @@ class Router {
   [[nodiscard]] Run route_handed_over(const Run& frames, std::uint32_t length_max,
                                       std::uint64_t deliveries_end);
 
-  /// How many recipients frames to many were offered to, or are where they were handed over, since
-  /// the start; a run counts as one frame. Frames to one are bounded by what is read.
+  /// The recipients, since the start, that frames to many were offered to here or have on the shard
+  /// that they were handed over to. A run counts as one frame. Frames to one recipient do not
+  /// count: the bytes that are read bound them.
   [[nodiscard]] std::uint64_t deliveries() const { return deliveries_; }
 
   /// A frame that the hub itself made, to a node on whatever shard or behind a link (a REPORT).
@@ -74,7 +75,7 @@ class Router {
 
  private:
   enum class Origin : std::uint8_t { connection, another_shard };
-  /// How a run came here.
+  /// The way of a run into this router.
   struct Arrival {
     Origin origin;
     std::uint32_t last_bytes;  ///< of the run's last frame

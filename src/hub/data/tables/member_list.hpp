@@ -27,7 +27,8 @@ namespace gimnet::hub {
 template <class Member>
 class MemberList {
  public:
-  /// What a change copies at most. A copy of the list costs as many pointers less as this is more.
+  /// A change copies at most this many members. The larger it is, the fewer pointers a copy of the
+  /// list takes.
   static constexpr std::size_t kChunkMembers = 256;
 
   MemberList() = default;

@@ -9,8 +9,8 @@
 
 namespace gimnet::hub {
 
-/// Where a node's session lives. A generation is never 0 for a session that exists; it is compared
-/// again when a waiting frame is sent, so that a frame for a node that left never reaches the next
+/// The place of a node's session. A generation is never 0 for a session that exists. It is compared
+/// when a frame reaches the slot, so that a frame for a node that left never reaches the next
 /// holder of its slot.
 struct NodePlace {
   ShardIndex shard;
@@ -77,7 +77,7 @@ class NodeTable {
     return shards_.load(
         std::memory_order_relaxed);  // relaxed: a shard that is missed had no node a moment ago
   }
-  /// How many nodes live on that shard.
+  /// The number of nodes that live on that shard.
   [[nodiscard]] std::uint32_t nodes_on(ShardIndex shard) const {
     return nodes_by_shard_[shard.value()].load(std::memory_order_relaxed);  // relaxed: as above
   }
