@@ -79,6 +79,8 @@ class Groups(Chain):
         self.assertEqual(self.robot.event(SUBSCRIBERS)[4], 1)
         self.stranger(self.first, "c").subscribe("robot/scan")
         self.assertEqual(self.robot.event(SUBSCRIBERS)[4], 2)
+        shown = [json.loads(run_gimnet(hub, "services", "--json").out)[0]["subscribers"] for hub in (self.first, self.last)]
+        self.assertEqual(shown, [2, 2], "c and a link at the provider's hub, a and b at the last one")
 
     def test_a_subscriber_that_was_there_before_the_service(self):
         viewer = self.stranger(self.last, "viewer")

@@ -76,7 +76,7 @@ Conductor::Conductor(HubFacts facts, Placement placement, Limits& limits, Wiring
                       wiring_.network->routes, names_, groups_, wiring_.network->dial,
                       wiring_.network->random});
     overview_ = std::make_unique<NetworkOverview>(
-        NetworkOverview::Parts{facts_, *links_, wiring_.sessions});
+        NetworkOverview::Parts{facts_, *links_, names_, groups_, wiring_.sessions});
     remote_requests_ =
         std::make_unique<RemoteRequests>(RemoteRequests::Parts{facts_, wiring_.shards, *links_});
   }

@@ -55,6 +55,8 @@ class NetworkNames {
   [[nodiscard]] const NameCopies* copies() const {
     return exchange_ ? &exchange_->copies() : nullptr;
   }
+  /// Messages about names that were not what they should be.
+  [[nodiscard]] std::uint64_t malformed() const { return exchange_ ? exchange_->malformed() : 0; }
   /// Names may be missing, since a link came up a moment ago.
   [[nodiscard]] bool is_learning(std::chrono::milliseconds now) const {
     return exchange_ && exchange_->is_learning(now);

@@ -65,6 +65,14 @@ std::vector<LinkView> NetworkOverview::links() const {
   return links;
 }
 
+std::vector<NetworkView::Count> NetworkOverview::not_taken() const {
+  const NameCopies* names = parts_.names.copies();
+  return {{"links.malformed", parts_.links.network().malformed() + parts_.names.malformed() +
+                                  parts_.groups.malformed()},
+          {"links.joins_refused", parts_.groups.refused()},
+          {"links.names_refused", names == nullptr ? 0 : names->refused()}};
+}
+
 LinkState NetworkOverview::state_of(const HubLink& link) const {
   if (!link.connected()) return link.resume_until() ? LinkState::away : LinkState::dialling;
   if (!parts_.links.network().is_up(link.number())) return LinkState::learning;

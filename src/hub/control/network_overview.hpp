@@ -5,8 +5,10 @@
 #include <string_view>
 #include <vector>
 
+#include "hub/control/group_links.hpp"
 #include "hub/control/hub_facts.hpp"
 #include "hub/control/links.hpp"
+#include "hub/control/network_names.hpp"
 #include "hub/control/network_view.hpp"
 #include "hub/observe/session_gauges.hpp"
 
@@ -19,12 +21,15 @@ class NetworkOverview final : public NetworkView {
   struct Parts {
     const HubFacts& facts;
     Links& links;
+    const NetworkNames& names;
+    const GroupLinks& groups;
     std::span<const SessionGauges* const> sessions;  ///< one per shard, or none
   };
   explicit NetworkOverview(const Parts& parts) : parts_(parts) {}
 
   [[nodiscard]] std::vector<HubView> hubs() const override;
   [[nodiscard]] std::vector<LinkView> links() const override;
+  [[nodiscard]] std::vector<Count> not_taken() const override;
   [[nodiscard]] std::string add_link(const DialledLink& link) override {
     return parts_.links.add(link);
   }

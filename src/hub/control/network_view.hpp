@@ -68,6 +68,12 @@ class NetworkView {
   /// This hub first, then by ascending id.
   [[nodiscard]] virtual std::vector<HubView> hubs() const = 0;
   [[nodiscard]] virtual std::vector<LinkView> links() const = 0;
+  /// Of what came over links and was not taken, by name, since the hub began.
+  struct Count {
+    const char* name;
+    std::uint64_t value = 0;
+  };
+  [[nodiscard]] virtual std::vector<Count> not_taken() const = 0;
   /// Dials a further link from now on. Returns why not, or "".
   [[nodiscard]] virtual std::string add_link(const DialledLink& link) = 0;
   /// Ends a link and dials it no more. Returns why not, or "".

@@ -14,6 +14,7 @@ namespace {
 
 constexpr std::string_view kDropped = "dropped.";
 constexpr std::string_view kRefused = "refused.";
+constexpr std::string_view kLinks = "links.";
 
 std::uint64_t value_of(const Counters& counters, std::string_view name) {
   const auto found = std::ranges::find(
@@ -165,7 +166,7 @@ std::string text_of(const HubStatus& status, Paint paint) {
   text += "mailbox: " + std::to_string(value_of(counters, "mailbox_entries")) + " entries, " +
           std::to_string(value_of(counters, "mailbox_wakeups")) + " wake-ups\n";
   for (const auto& [name, value] : counters) {
-    if (name.starts_with(kRefused) && value != 0)
+    if ((name.starts_with(kRefused) || name.starts_with(kLinks)) && value != 0)
       text += name + ": " + std::to_string(value) + "\n";
   }
   return text + "\n" + connections_table(status.connections, paint);

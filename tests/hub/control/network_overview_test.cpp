@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "base/endian.hpp"
+#include "proto/control/route_groups.hpp"
 #include "tests/hub/control/support/link_rig.hpp"
 
 namespace gimnet::hub {
@@ -11,8 +13,8 @@ using std::chrono::milliseconds;
 
 TEST(NetworkOverview, ShowsHubsAndLinksOfBothEnds) {
   LinkedRigs hubs;
-  const NetworkOverview at_a({hubs.a.facts, hubs.a.links, {}});
-  const NetworkOverview at_b({hubs.b.facts, hubs.b.links, {}});
+  const NetworkOverview at_a({hubs.a.facts, hubs.a.links, hubs.a.names, hubs.a.groups, {}});
+  const NetworkOverview at_b({hubs.b.facts, hubs.b.links, hubs.b.names, hubs.b.groups, {}});
   ASSERT_EQ(at_b.links().size(), 1u);
   EXPECT_EQ(at_b.links()[0].state, LinkState::dialling);
   hubs.connect();
@@ -37,6 +39,21 @@ TEST(NetworkOverview, ShowsHubsAndLinksOfBothEnds) {
   hubs.a.pass(milliseconds{100});
   ASSERT_EQ(at_a.hubs().size(), 2u) << "its record is still known";
   EXPECT_FALSE(at_a.hubs()[1].reachable);
+}
+
+TEST(NetworkOverview, CountsWhatCameOverLinksAndWasNotTaken) {
+  LinkedRigs hubs;
+  const NetworkOverview at_a({hubs.a.facts, hubs.a.links, hubs.a.names, hubs.a.groups, {}});
+  hubs.link();
+  const auto malformed = [&] { return at_a.not_taken()[0].value; };
+  EXPECT_EQ(malformed(), 0u);
+  // A JOIN without groups.
+  proto::Payload join(proto::kControlHeaderSize);
+  store_le(join.data(), proto::route::Join::kOperation);
+  const AttachCommand& link = hubs.a.attached();
+  hubs.a.links.on_route(link.session, link.attachment, join, hubs.a.moment());
+  EXPECT_STREQ(at_a.not_taken()[0].name, "links.malformed");
+  EXPECT_EQ(malformed(), 1u);
 }
 
 }  // namespace

@@ -29,6 +29,10 @@ void add_conductor(const HandlerContext& context, ctrl::StatisticsAnswer& answer
   };
   if (context.refusals != nullptr) for_each_counter(*context.refusals, add);
   if (context.requests != nullptr) for_each_counter(*context.requests, add);
+  if (context.network != nullptr) {
+    for (const NetworkView::Count& count : context.network->not_taken())
+      add(count.name, count.value);
+  }
   if (!record.counters.empty()) answer.shards.push_back(std::move(record));
 }
 

@@ -137,7 +137,10 @@ Result<ns::ServicesAnswer, proto::Refusal> services(const HandlerContext& contex
       [](const NameCopies& names, GroupId after) { return names.group_after(after); },
       [&](const KnownName& known) -> std::optional<ns::ServiceRecord> {
         if (pattern && !pattern->matches(known.name)) return std::nullopt;
-        return service_record_of(known);
+        ns::ServiceRecord record = service_record_of(known);
+        if (const Topic* topic = own.find(record.name))
+          record.subscribers = topic->subscriber_count();
+        return record;
       },
       [&](std::uint32_t after) {
         return list_services(own, {pattern ? &*pattern : nullptr, GroupIndex{after}, false,

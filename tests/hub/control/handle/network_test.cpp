@@ -22,6 +22,7 @@ class FakeNetwork final : public NetworkView {
  public:
   [[nodiscard]] std::vector<HubView> hubs() const override { return all_hubs; }
   [[nodiscard]] std::vector<LinkView> links() const override { return all_links; }
+  [[nodiscard]] std::vector<Count> not_taken() const override { return {}; }
   std::string add_link(const DialledLink& link) override {
     added.push_back(link);
     return fault;
