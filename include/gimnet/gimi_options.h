@@ -28,8 +28,8 @@ typedef struct gimi_node_options {
   /** At most 255 bytes: up to 16 parts of A-Z a-z 0-9 . _ -, separated by `/`. NULL or "": a node
    * without a name, found by its id only. */
   const char* name;
-  /** `tcp://host:port` or `unix:/path`. NULL or "": the environment's GIMNET_HUB, else the hub of
-   * this machine. */
+  /** `tcp://host:port` or `unix:/path`, or several of one network with commas. NULL or "": those of
+   * GIMNET_HUB, else the hub of this machine. */
   const char* hub;
   const char* description; /**< For people, at most 256 bytes. */
   /** `http://host:port` or `http://user:password@host:port`: the HTTP proxy to reach `hub` through.

@@ -110,10 +110,10 @@ typedef nif_verdict (*nif_callback)(void* user, const struct nif_incoming* in);
 /** The options of connecting. Zero members mean the default. */
 typedef struct nif_options {
   size_t struct_size; /**< sizeof(nif_options). */
-  /** `tcp://host:port` or `unix:/path`. NULL or "": the environment's GIMNET_HUB; where that is not
-   * set, the hub's default Unix socket (gimnet/tcphub.sock in XDG_RUNTIME_DIR, else in the folder
-   * gimnet-UID in the temporary folder, which must belong to this user), then
-   * tcp://127.0.0.1:7450. */
+  /** `tcp://host:port` or `unix:/path`, or several of one network with commas. NULL or "": those of
+   * GIMNET_HUB; where that is not set, the hub's default Unix socket (gimnet/tcphub.sock in
+   * XDG_RUNTIME_DIR, else in the folder gimnet-UID in the temporary folder, which must belong to
+   * this user), then tcp://127.0.0.1:7450. */
   const char* url;
   const char* name; /**< Name to register, NULL or "": a node without a name, found by id only. */
   const char* description; /**< For people, at most 256 bytes. */
@@ -171,10 +171,10 @@ typedef struct nif_options {
    * is started again, unless this is as large. At most 64 MiB, which all services of the handle
    * have together. Messages not kept are counted (nif_counters.last_messages_not_kept). */
   uint32_t last_message_bytes;
-  /** `http://host:port` or `http://user:password@host:port`: the HTTP proxy to dial the hub of `url`
-   * (or GIMNET_HUB) through, by CONNECT; %XX stands for a special character of user or password.
-   * NULL: the environment's GIMNET_PROXY, if it is set, for a hub that `url` or GIMNET_HUB names by
-   * `tcp://`; "": none. */
+  /** `http://host:port` or `http://user:password@host:port`: the HTTP proxy to dial the hub of
+   * `url` (or GIMNET_HUB) through, by CONNECT; %XX stands for a special character of user or
+   * password. NULL: the environment's GIMNET_PROXY, if it is set, for a hub that `url` or
+   * GIMNET_HUB names by `tcp://`; "": none. */
   const char* proxy;
 } nif_options;
 

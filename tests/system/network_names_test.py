@@ -1,12 +1,14 @@
 #!/usr/bin/env python3
 """Names across linked hubs: three in a chain, and strangers at its ends."""
 
+import signal
 import time
 import unittest
 
 from stranger_parts.bitestream import TEXT, U32, U8, every, fields, put
 from stranger_parts.case import PATIENT, Case
 from stranger_parts.client import NS, UNICAST, Denied, Refused
+from support.processes import run_gimnet, start_gimnet
 from support.waiting import wait_until
 
 
@@ -84,6 +86,79 @@ class NetworkNames(Case):
                 seen.append((service.get(1), service.get(2)))
         services = [fields(service) for service in every(viewer.ask(NS, 9), 3)]
         self.assertEqual([(service[1], service[2], service[3]) for service in services], [(group, "robot/scan", robot.id)])
+
+
+class Moves(Case):
+    """Two linked hubs, and a node that goes from one to the other."""
+
+    def setUp(self):
+        self.first = self.hub("--accept-links", *PATIENT, hub_id=1)
+        self.second = self.hub("--link", self.first.url, *PATIENT, hub_id=2)
+        self.viewer = self.stranger(self.second, "viewer")
+
+    def robot(self):
+        robot = self.stranger(self.first, "robot")
+        wait_until(lambda: self.is_held_by(robot.id), "the robot is known")
+        return robot
+
+    def is_held_by(self, node):
+        try:
+            return self.viewer.resolve("robot") == node
+        except Denied:
+            return False
+
+    def come(self, robot, token=None):
+        """The robot at the second hub."""
+        return self.stranger(self.second, "robot", token=token or robot.welcome[2], extra=put(13, U32, robot.id))
+
+    def test_a_node_that_shows_its_token_has_its_name_at_once(self):
+        robot = self.robot()
+        moved = self.come(robot)
+        self.assertEqual((moved.id >> 20, moved.welcome[18]), (2, "robot"))
+        self.assertTrue(self.is_held_by(moved.id))
+        self.assertEqual(self.goodbye(robot), 8)  # replaced
+        watcher = self.stranger(self.first, "watcher")
+        wait_until(lambda: watcher.resolve("robot") == moved.id, "the first hub knows it")
+        with self.assertRaises(Refused) as refused:
+            self.stranger(self.first, "robot", token=robot.welcome[2])
+        self.assertEqual(refused.exception.args[0], 4, "the former token counts as none")
+        back = self.stranger(self.first, "robot", token=moved.welcome[2], extra=put(13, U32, moved.id))
+        self.assertEqual(back.id >> 20, 1)
+        wait_until(lambda: self.is_held_by(back.id), "it is back")
+
+    def test_a_wrong_token_moves_nobody(self):
+        robot = self.robot()
+        with self.assertRaises(Refused) as refused:
+            self.come(robot, token=bytes(56))
+        self.assertEqual(refused.exception.args[0], 4)
+        self.assertTrue(self.is_held_by(robot.id))
+
+    def test_a_node_whose_hub_was_killed_has_its_name_before_the_grace_time(self):
+        robot = self.robot()
+        self.first.process.signal(signal.SIGKILL)
+        self.first.process.wait()
+        with self.assertRaises(Refused):
+            self.stranger(self.second, "robot")  # the name is unreachable, or not yet
+        moved = self.come(robot)
+        self.assertTrue(self.is_held_by(moved.id))
+
+    def test_a_program_that_knows_both_hubs_goes_on_at_the_other_one(self):
+        both = f"{self.first.url},{self.second.url}"
+        receiver = start_gimnet(self, both, "recv", "--name", "robot", "--raw", "-n", "2")
+        held = self.first.wait_for_node("robot")
+        sent = run_gimnet(self.second, "send", "robot", data=b"one\n")
+        self.assertEqual(sent.code, 0, sent.err)
+        self.first.process.signal(signal.SIGKILL)
+        self.first.process.wait()
+
+        def is_back():
+            found = [node for node in self.second.nodes() if node["name"] == "robot" and node["connected"]]
+            return found and found[0]["id"] != held["id"]
+
+        wait_until(is_back, "the robot at the second hub")
+        sent = run_gimnet(f"tcp://127.0.0.1:1,{self.second.url}", "send", "robot", data=b"two\n")
+        self.assertEqual(sent.code, 0, sent.err)
+        self.assertEqual((receiver.wait(), receiver.out), (0, b"one\ntwo\n"), receiver.err)
 
 
 if __name__ == "__main__":

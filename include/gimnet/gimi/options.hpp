@@ -32,8 +32,8 @@ struct NodeOptions {
   /// At most 255 bytes: up to 16 parts of A-Z a-z 0-9 . _ -, separated by `/`. "": a node without a
   /// name, found by its id only.
   std::string name{};
-  /// `tcp://host:port` or `unix:/path`. "": the environment's GIMNET_HUB, else the hub of this
-  /// machine.
+  /// `tcp://host:port` or `unix:/path`, or several of one network with commas. "": those of
+  /// GIMNET_HUB, else the hub of this machine.
   std::string hub{};
   std::string description{};  ///< for people, at most 256 bytes
   Timeout timeout{5000};      ///< for joining, in ms

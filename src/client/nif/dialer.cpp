@@ -1,6 +1,10 @@
 #include "client/nif/dialer.hpp"
 
+#include <cstddef>
+#include <cstdint>
 #include <utility>
+
+#include "base/clock.hpp"
 
 namespace gimnet::nif {
 namespace {
@@ -25,9 +29,13 @@ Result<Admitted, Failure> admit(std::span<const net::Address> addresses,
                                 Deadline deadline, const net::WakeSignal& cancel,
                                 const TokenFor& token_for) {
   Failure last{NIF_NO_HUB, "no address to connect to"};
-  for (const net::Address& address : addresses) {
-    auto admitted = admit_at(address, options, hello, deadline, cancel, token_for);
-    if (admitted || admitted.error().status != NIF_NO_HUB) return admitted;
+  for (std::size_t i = 0; i < addresses.size(); ++i) {
+    // One that never answers leaves the others their share of the time.
+    const auto left = static_cast<std::int64_t>(addresses.size() - i);
+    const std::int64_t now = steady_now_ns();
+    const Deadline until = deadline == kNever ? kNever : now + (deadline - now) / left;
+    auto admitted = admit_at(addresses[i], options, hello, until, cancel, token_for);
+    if (admitted || !admitted.error().other_hubs_may) return admitted;
     last = admitted.error();
   }
   return last;

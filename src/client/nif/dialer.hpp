@@ -24,10 +24,11 @@ struct Admitted {
 /// The token to show at an address; empty: none.
 using TokenFor = std::function<std::vector<std::byte>(const std::string& address)>;
 
-/// Connects a node, for nif_connect() and the library's thread: dials each address in turn and
-/// shakes hands, until one hub admits the node, one refuses it, or the time is up. Where several
-/// fail, the last hub-less failure is told. `token_for` is asked where `hello` has no token; it may
-/// be empty. Errors: those of net::dial_hub(); NIF_CLOSED when `cancel` was raised.
+/// Connects a node, for nif_connect() and the library's thread: dials each address in turn, for its
+/// share of the time, and shakes hands, until one hub admits the node, one refuses it for a reason
+/// that holds at all hubs, or the time is up. Where several fail, the last failure is told.
+/// `token_for` is asked where `hello` has no token; it may be empty. Errors: those of
+/// net::dial_hub(); NIF_CLOSED when `cancel` was raised.
 [[nodiscard]] Result<Admitted, Failure> admit(std::span<const net::Address> addresses,
                                               const net::DialOptions& options,
                                               const proto::Hello& hello, Deadline deadline,

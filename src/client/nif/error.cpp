@@ -63,10 +63,25 @@ nif_status status_of(const net::NetError& error) {
   return NIF_PROTOCOL;
 }
 
+bool other_hubs_may(const net::NetError& error) {
+  switch (error.fault) {
+    case net::Fault::no_host:
+    case net::Fault::no_peer:
+    case net::Fault::timeout:
+      return true;
+    case net::Fault::refused:
+      return error.goodbye == proto::GoodbyeCode::hub_full ||
+             error.goodbye == proto::GoodbyeCode::no_memory ||
+             error.goodbye == proto::GoodbyeCode::draining;
+    default:
+      return false;
+  }
+}
+
 }  // namespace
 
 Failure failure_of(const net::NetError& error) {
-  return {status_of(error), error.sentence, error.nobody_listens};
+  return {status_of(error), error.sentence, error.nobody_listens, other_hubs_may(error)};
 }
 
 nif_status fail(nif_status status, std::string_view sentence) {

@@ -30,6 +30,7 @@ struct Failure {
   nif_status status = NIF_OK;
   std::string sentence;
   bool nobody_listens = false;  ///< at the hub's address: its process is gone
+  bool other_hubs_may = false;  ///< take the node: this one is away, full or ends
 };
 
 /// A failure to connect as the calls of NIF answer it.

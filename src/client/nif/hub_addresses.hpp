@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -11,9 +12,11 @@
 
 namespace gimnet::nif {
 
-/// The addresses to try, in this order: `url` if not empty, else GIMNET_HUB of the environment,
-/// else the user's default Unix socket (left out where its folder is missing or another user's) and
-/// then tcp://127.0.0.1:7450. Errors: NIF_BAD_ARGUMENT.
+inline constexpr std::size_t kHubsMax = 16;
+
+/// The addresses to try, in this order: those of `url` if not empty, separated by commas, else
+/// those of GIMNET_HUB of the environment, else the user's default Unix socket (left out where its
+/// folder is missing or another user's) and then tcp://127.0.0.1:7450. Errors: NIF_BAD_ARGUMENT.
 [[nodiscard]] Result<std::vector<net::Address>, Failure> hub_addresses(std::string_view url);
 
 /// The proxy to dial the hub through: `proxy`, or GIMNET_PROXY of the environment if that is null.

@@ -46,6 +46,7 @@ Node::Node(Options options)
       inbound_(options_.reassembly, *this),
       tokens_(options_.name, options_.keep_token),
       name_(options_.name),
+      addresses_(options_.addresses),
       epoch_(random_bits() | 1) {}
 
 Node::~Node() = default;
@@ -60,6 +61,7 @@ proto::Hello Node::hello() const {
   hello.resume = options_.resume;
   hello.resume_epoch = session_.resume ? session_.hub_epoch : 0;
   hello.resume_taken = session_.resume ? inbound_.taken() : 0;
+  hello.former = NodeId{session_.id};
   hello.shard = options_.shard;
   hello.resume_buffer_bytes =
       static_cast<std::uint32_t>(std::min<std::size_t>(options_.send.retained_bytes, UINT32_MAX));
@@ -77,8 +79,8 @@ Result<std::unique_ptr<Node>, Failure> Node::connect(Options options) {
     return node->tokens_.find(address);
   };
   for (;;) {
-    auto admitted = admit(node->options_.addresses, node->options_.dialling, node->hello(),
-                          deadline, node->stop_, token_for);
+    auto admitted = admit(node->addresses_, node->options_.dialling, node->hello(), deadline,
+                          node->stop_, token_for);
     if (admitted) {
       if (!node->take_over(std::move(*admitted), true)) {
         return Failure{NIF_PROTOCOL, "the hub resumes a connection that never was"};
@@ -112,6 +114,9 @@ bool Node::take_over(Admitted admitted, bool first) {
   last_ping_ns_ = 0;
   if (session_.hub_time_ns != 0) clock_.begin(session_.hub_time_ns, last_heard_ns_);
   address_ = std::move(admitted.address);
+  hub_ends_ = false;
+  const auto there = std::ranges::find(addresses_, address_, &net::Address::url);
+  if (there != addresses_.end()) std::rotate(addresses_.begin(), there, addresses_.end());
   keep_token();
   {
     const MutexLock lock(mutex_);

@@ -136,6 +136,8 @@ class Node final : private InboundHost {
   void leave();
 
   [[nodiscard]] proto::Hello hello() const;
+  /// The hubs to dial now, in this order.
+  [[nodiscard]] std::span<const net::Address> hubs_to_dial() const;
   void take_new_name() GIMNET_EXCLUDES(mutex_);
   void keep_token() GIMNET_EXCLUDES(mutex_);
   /// False: the hub's counts are impossible.
@@ -182,6 +184,8 @@ class Node final : private InboundHost {
   Session session_;
   std::string address_;  ///< of the hub that admitted it last, as a URL
   std::string name_;     ///< to ask for
+  std::vector<net::Address> addresses_;  ///< of hubs; the one that admitted it last comes first
+  bool hub_ends_ = false;                ///< that hub said so
   net::DialBackoff backoff_;
   std::uint64_t epoch_ = 0;
   std::uint64_t confirmed_ = 0;

@@ -17,6 +17,8 @@ namespace {
 constexpr std::int64_t kLeaveNs = 1'000'000'000;
 /// The longest try of a reconnect.
 constexpr std::int64_t kRedialNs = 5'000'000'000;
+/// So long after a break the former hub alone is dialled: there the session can go on.
+constexpr std::int64_t kFormerHubNs = 1'000'000'000;
 /// Keep-alive intervals after which the hub's clock is measured again, however busy the node is.
 constexpr std::int64_t kMeasureIntervals = 5;
 
@@ -221,7 +223,7 @@ void Node::redial() {
   take_new_name();
   Deadline deadline = steady_now_ns() + kRedialNs;
   if (resumes_only_) deadline = std::min(deadline, broke_ns_ + session_.grace_ns);
-  auto admitted = admit(options_.addresses, options_.dialling, hello(), deadline, stop_);
+  auto admitted = admit(hubs_to_dial(), options_.dialling, hello(), deadline, stop_);
   if (!admitted) {
     if (admitted.error().status == NIF_CLOSED) return;
     set_last_error(admitted.error().sentence);
@@ -236,6 +238,12 @@ void Node::redial() {
     return;
   }
   outbound_.write_pending(true);
+}
+
+std::span<const net::Address> Node::hubs_to_dial() const {
+  const bool may_be_back = !hub_ends_ && steady_now_ns() - broke_ns_ < kFormerHubNs;
+  const std::size_t most = resumes_only_ || may_be_back ? 1 : addresses_.size();
+  return std::span(addresses_).first(std::min(most, addresses_.size()));
 }
 
 bool Node::dials_again(const Failure& failure) const {
@@ -297,6 +305,7 @@ std::optional<Failure> Node::ending_of(const std::string& why, proto::GoodbyeCod
 void Node::disconnect(std::string why, proto::GoodbyeCode code) {
   const std::optional<Failure> ending = ending_of(why, code);
   resumes_only_ = may_resume(code);
+  hub_ends_ = code == proto::GoodbyeCode::draining;
   broke_ns_ = steady_now_ns();
   outbound_.detach(!ending);
   stream_.reset();

@@ -1,7 +1,6 @@
 #include "hub/control/conductor.hpp"
 
 #include "base/check.hpp"
-#include "base/endian.hpp"
 #include "base/id_text.hpp"
 #include "base/log.hpp"
 #include "hub/control/dispatch.hpp"
@@ -46,13 +45,6 @@ Sessions::Options sessions_options(const HubFacts& facts, Placement placement, c
   return options;
 }
 
-/// Never 0, and another one at each start, also of a hub that keeps nothing.
-std::uint64_t epoch_of(const HubStart& start) {
-  const std::uint64_t epoch =
-      load_le<std::uint64_t>(start.state.unique_id.data()) + start.state.boot;
-  return epoch != 0 ? epoch : 1;
-}
-
 }  // namespace
 
 Conductor::Conductor(HubFacts facts, Placement placement, Limits& limits, Wiring wiring)
@@ -79,32 +71,29 @@ Conductor::Conductor(HubFacts facts, Placement placement, Limits& limits, Wiring
         NetworkOverview::Parts{facts_, *links_, names_, groups_, wiring_.sessions});
     remote_requests_ =
         std::make_unique<RemoteRequests>(RemoteRequests::Parts{facts_, wiring_.shards, *links_});
+    moving_ = std::make_unique<MovingNodes>(
+        MovingNodes::Parts{facts_, limits_, *links_, names_, wiring_.refusals});
   }
   if (returns_published_) publisher_.expect_all(wiring_.start.nodes.used);
 }
 
 std::optional<Goodbye> Conductor::admit(Stranger& stranger, const proto::Hello& hello,
                                         Moment moment) {
+  if (hello.role == proto::Role::hub && links_ != nullptr && !draining_)
+    return links_->admit(stranger, hello, {moment.now, moment.wall_ns});
+  if (moving_ != nullptr && !draining_ && moving_->take(stranger, hello, moment.now))
+    return std::nullopt;
+  return admit_node(stranger, hello, moment);
+}
+
+std::optional<Goodbye> Conductor::admit_node(Stranger& stranger, const proto::Hello& hello,
+                                             Moment moment) {
   if (draining_)
     return Goodbye{GoodbyeCode::draining, "the hub is shutting down; connect to another one"};
-  if (hello.role == proto::Role::hub && links_ != nullptr)
-    return links_->admit(stranger, hello, {moment.now, moment.wall_ns});
-  JoinRequest request;
-  request.role = hello.role;
-  request.name = hello.name;
-  request.token = hello.token;
-  request.description = hello.description;
-  request.shard_hint = hello.shard;
-  request.origin = Origin{stranger.peer.transport, stranger.peer.address};
-  // Root and the hub's own user need no bound: they can end the hub.
-  if (!stranger.rights.administer)
-    request.crowd = crowd_of(stranger.identity, stranger.peer.address);
-  request.resumes = hello.resume;
-  request.rights = stranger.rights;
-  request.identity = stranger.identity;
-  request.wall = milliseconds{moment.wall_ns / 1'000'000};
   Effects effects;
-  const auto joined = membership_.join(request, moment.now, effects);
+  const auto joined =
+      membership_.join(join_request_of(stranger, hello, milliseconds{moment.wall_ns / 1'000'000}),
+                       moment.now, effects);
   carry_out(effects, moment.now);
   if (!joined) return joined.error();
   attach(stranger, hello, *joined, moment);
@@ -176,6 +165,7 @@ void Conductor::on_event(ShardEvent event, milliseconds now) {
     if (!is_link(detached->node)) return on_detached(*detached, now);
     links_->on_detached(*detached, moment(now));
     settle(now);
+    admit_moved({}, now);
   } else if (const auto* missed = std::get_if<EventsMissedEvent>(&event.what)) {
     if (const Session* session = find(missed->session, missed->node))
       runner_.events_missed(*session, missed->attachment);
@@ -245,26 +235,35 @@ HandlerContext Conductor::context_for(Effects& effects, milliseconds now) {
                          this};
   context.network = overview_.get();
   context.names = &names_;
+  context.wall = milliseconds{moment(now).wall_ns / 1'000'000};
   return context;
 }
 
 void Conductor::on_link_frame(const ControlFrameEvent& event, milliseconds now) {
-  const proto::Kind kind = proto::load_header(event.frame.data()).kind;
+  const proto::FrameHeader header = proto::load_header(event.frame.data());
+  const proto::Kind kind = header.kind;
   const std::span<const std::byte> payload = std::span{event.frame}.subspan(proto::kHeaderSize);
   if (kind == proto::Kind::route) {
     links_->on_route(event.session, event.attachment, payload, moment(now));
     return settle(now);
   }
-  if (!remote_requests_->take(event, now)) return;
+  if (!remote_requests_->take(event, now))
+    return admit_moved(remote_requests_->take_own_answers(), now);
   const auto view = proto::split_control(payload);
   if (!view) return;
-  Effects effects;  // nothing that is asked from afar has any
+  Effects effects;
   HandlerContext context = context_for(effects, now);
   static const Session kAfar{};
-  const Handler handle = may_be_asked_from_afar(kind, view->header.operation)
-                             ? handler_for(proto::Role::node, kind, view->header.operation)
-                             : handle_denied_from_afar;
-  remote_requests_->answer(event, handle(context, {kAfar, view->header, payload, true}));
+  const Handler handle = handler_from_afar(NodeId{header.src}, kind, view->header.operation);
+  const proto::Payload answer = handle(context, {kAfar, view->header, payload, true});
+  carry_out(effects, now);
+  remote_requests_->answer(event, answer);
+}
+
+void Conductor::admit_moved(std::span<const HubAnswer> answers, milliseconds now) {
+  moving_->settle(answers, now, [this, now](Stranger& stranger, const proto::Hello& hello) {
+    return admit_node(stranger, hello, {now, moment(now).wall_ns});
+  });
 }
 
 void Conductor::on_oddity(const ControlFrameEvent& event, milliseconds now) {
@@ -310,6 +309,7 @@ void Conductor::tick(milliseconds now) {
     links_->tick(moment(now));
     settle(now);
     remote_requests_->tick(now);
+    admit_moved({}, now);
   }
   Effects effects;
   membership_.tick(now, effects);
@@ -330,8 +330,9 @@ std::optional<milliseconds> Conductor::next_deadline() const {
       returns_published_ ? membership_.sessions().returns_until() : std::nullopt;
   const auto links_due = links_ != nullptr ? links_->next_deadline() : std::nullopt;
   const auto answers_due = links_ != nullptr ? remote_requests_->next_due() : std::nullopt;
-  for (const std::optional<milliseconds>& other :
-       {keeper_.again_at(), returns_until, links_due, answers_due, groups_.next_due()}) {
+  const auto moving_due = links_ != nullptr ? moving_->next_due() : std::nullopt;
+  for (const std::optional<milliseconds>& other : {keeper_.again_at(), returns_until, links_due,
+                                                   answers_due, moving_due, groups_.next_due()}) {
     if (other && (!deadline || *other < *deadline)) deadline = other;
   }
   return deadline;
@@ -352,11 +353,8 @@ Reloading Conductor::reload() {
   if (wiring_.read_again) reloading = wiring_.read_again();
   if (!wiring_.read_again)
     reloading.faults.emplace_back("this hub has no configuration that could be read again");
-  for (const std::string& fault : reloading.faults) log_error(fault);
-  if (reloading.more_faults)
-    log_error("there are more faults; tcphub --check-config tells all of them");
   if (!reloading.faults.empty()) {
-    log_error("the configuration was not read again: the former one stays in force, whole");
+    log_faults(reloading);
     return reloading;
   }
   limits_ = reloading.limits;

@@ -13,6 +13,7 @@
 #include "hub/control/handle/request.hpp"
 #include "hub/control/hub_facts.hpp"
 #include "hub/control/links.hpp"
+#include "hub/control/moving_nodes.hpp"
 #include "hub/control/network_names.hpp"
 #include "hub/control/network_overview.hpp"
 #include "hub/control/remote_requests.hpp"
@@ -44,7 +45,7 @@ class Conductor final : private Administration {
     HubStart start{};                                  ///< its state was kept already
     StateKeeper::Keep keep_state{};                    ///< or none: in memory only
     std::span<const SessionGauges* const> sessions{};  ///< one per shard, or none
-    const RefusalCounters* refusals = nullptr;         ///< or none
+    RefusalCounters* refusals = nullptr;               ///< or none
     ReadAgain read_again{};  ///< or none: the configuration stays as it is
     std::function<void(LogLevel)>
         note_log_level{};  ///< told of levels that were set by request; or none
@@ -121,6 +122,10 @@ class Conductor final : private Administration {
   [[nodiscard]] const Watches& watches() const { return watches_; }
 
  private:
+  [[nodiscard]] std::optional<proto::Goodbye> admit_node(Stranger& stranger,
+                                                         const proto::Hello& hello, Moment moment);
+  /// Admits nodes of other hubs that wait no longer.
+  void admit_moved(std::span<const HubAnswer> answers, std::chrono::milliseconds now);
   void attach(Stranger& stranger, const proto::Hello& hello, const Membership::Joined& joined,
               Moment moment);
   [[nodiscard]] proto::Welcome welcome(const Session& session, const proto::Hello& hello,
@@ -174,6 +179,7 @@ class Conductor final : private Administration {
   std::unique_ptr<Links> links_;                     ///< nullptr: a hub alone
   std::unique_ptr<NetworkOverview> overview_;        ///< with links_
   std::unique_ptr<RemoteRequests> remote_requests_;  ///< with links_
+  std::unique_ptr<MovingNodes> moving_;              ///< with links_
   bool returns_published_ =
       false;           ///< after a restart: to the shards nodes that are not back yet count as away
   bool ends_ = false;  ///< somebody asked for it

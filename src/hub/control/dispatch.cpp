@@ -67,6 +67,13 @@ proto::Payload handle_unknown(HandlerContext&, const Request& request) {
                        "this hub has no operation " + std::to_string(request.header.operation)});
 }
 
+proto::Payload handle_denied_from_afar(HandlerContext&, const Request& request) {
+  return proto::encode_refusal(
+      request.header, {proto::Status::denied,
+                       "from another hub this can be asked for when identities travel; connect to "
+                       "the hub itself"});
+}
+
 }  // namespace
 
 Handler handler_for(Role role, Kind kind, std::uint16_t operation) {
@@ -77,7 +84,7 @@ Handler handler_for(Role role, Kind kind, std::uint16_t operation) {
   return handle_unknown;
 }
 
-bool may_be_asked_from_afar(Kind kind, std::uint16_t operation) {
+Handler handler_from_afar(NodeId asker, Kind kind, std::uint16_t operation) {
   constexpr std::array kNames{ns::Resolve::kOperation, ns::Reverse::kOperation,
                               ns::List::kOperation, ns::Services::kOperation};
   constexpr std::array kAdmin{ctrl::HubInfo::kOperation, ctrl::Statistics::kOperation,
@@ -86,14 +93,10 @@ bool may_be_asked_from_afar(Kind kind, std::uint16_t operation) {
   const auto has = [operation](const auto& all) {
     return std::ranges::find(all, operation) != all.end();
   };
-  return kind == Kind::ns ? has(kNames) : has(kAdmin);
-}
-
-proto::Payload handle_denied_from_afar(HandlerContext&, const Request& request) {
-  return proto::encode_refusal(
-      request.header, {proto::Status::denied,
-                       "from another hub this can be asked for when identities travel; connect to "
-                       "the hub itself"});
+  const bool is_hub = index_of(asker) == kHubIndex;
+  if (is_hub && kind == Kind::ns && operation == ns::LetGo::kOperation) return handle_let_go;
+  const bool reads = kind == Kind::ns ? has(kNames) : has(kAdmin);
+  return reads ? handler_for(Role::node, kind, operation) : handle_denied_from_afar;
 }
 
 proto::Payload handle_for_another(HandlerContext& context, const Request& request) {

@@ -9,11 +9,9 @@ namespace gimnet::hub {
 /// the table is answered `not_supported`, what is for others `denied`. Thread safety: any thread.
 [[nodiscard]] Handler handler_for(proto::Role role, proto::Kind kind, std::uint16_t operation);
 
-/// May it come over a link from a node of another hub? Requests that only read may.
-[[nodiscard]] bool may_be_asked_from_afar(proto::Kind kind, std::uint16_t operation);
-/// The answer to one that may not: `denied`.
-[[nodiscard]] proto::Payload handle_denied_from_afar(HandlerContext& context,
-                                                     const Request& request);
+/// The handler for what comes over a link from `asker`, a node of another hub or a hub itself:
+/// requests that only read, and LET_GO of a hub. Others are answered `denied`.
+[[nodiscard]] Handler handler_from_afar(NodeId asker, proto::Kind kind, std::uint16_t operation);
 
 /// The answer to a request whose frame is not for this hub: `not_found`.
 [[nodiscard]] proto::Payload handle_for_another(HandlerContext& context, const Request& request);

@@ -49,6 +49,9 @@ class NetworkNames {
   /// Lets go of names that were lost, and tells own nodes what changed elsewhere.
   void settle(std::chrono::milliseconds now, Effects& effects);
 
+  void note_let_go(std::string_view name, HubId hub) {
+    if (exchange_) exchange_->note_let_go(name, hub);
+  }
   /// The service of another hub that gives data under that name; nothing: there is none.
   [[nodiscard]] std::optional<AwayService> away_service(std::string_view full_name) const;
   /// Null: the hub has had no link yet.

@@ -22,6 +22,13 @@ std::string rest_of(const Reloading& reloading, std::size_t told) {
 
 }  // namespace
 
+void log_faults(const Reloading& reloading) {
+  for (const std::string& fault : reloading.faults) log_error(fault);
+  if (reloading.more_faults)
+    log_error("there are more faults; tcphub --check-config tells all of them");
+  log_error("the configuration was not read again: the former one stays in force, whole");
+}
+
 std::string reload_summary(const Reloading& reloading) {
   std::string changed;
   std::string restart;

@@ -30,6 +30,9 @@ struct Reloading {
 /// Reads the configuration again, from where it came. Thread safety: the conductor's thread only.
 using ReadAgain = std::function<Reloading()>;
 
+/// Says in the log why the configuration was not taken.
+void log_faults(const Reloading& reloading);
+
 /// One line for the log: the keys that changed, and those that need a restart.
 [[nodiscard]] std::string reload_summary(const Reloading& reloading);
 

@@ -54,7 +54,13 @@ bool RemoteRequests::take(const ControlFrameEvent& event, milliseconds now) {
   const auto control = proto::split_control(payload_of(event));
   if (!control) return false;
   if (control->header.is_answer()) {
-    settle({dst, hub_of(NodeId{header.src}), control->header.request}, event.frame);
+    const HubId answers = hub_of(NodeId{header.src});
+    if (index_of(dst) == kHubIndex) {
+      own_answers_.push_back(
+          {answers, control->header.request, proto::read_status(control->body).status});
+    } else {
+      settle({dst, answers, control->header.request}, event.frame);
+    }
     return false;
   }
   if (rates_[event.node].take(kRate, now)) return true;

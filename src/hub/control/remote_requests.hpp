@@ -7,11 +7,13 @@
 #include <map>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "base/ids.hpp"
 #include "base/token_bucket.hpp"
 #include "hub/control/hub_facts.hpp"
 #include "hub/control/links.hpp"
+#include "hub/control/moving_nodes.hpp"
 #include "hub/control/shard_proxy.hpp"
 #include "hub/shard/commands.hpp"
 #include "proto/control/control_message.hpp"
@@ -40,8 +42,11 @@ class RemoteRequests {
                                                       ShardIndex shard,
                                                       std::chrono::milliseconds now);
   /// A frame of kind NS or CTRL that came over a link: it is passed on, or answers a request. True:
-  /// it is a request for this hub.
+  /// it is a request for this hub. Answers to this hub itself: take_own_answers().
   [[nodiscard]] bool take(const ControlFrameEvent& event, std::chrono::milliseconds now);
+  [[nodiscard]] std::vector<HubAnswer> take_own_answers() {
+    return std::exchange(own_answers_, {});
+  }
   /// Answers a request that came over a link.
   void answer(const ControlFrameEvent& event, const proto::Payload& payload);
   /// Answers those whose time is over.
@@ -70,6 +75,7 @@ class RemoteRequests {
   /// In the order of their times. Limit: the requests that the nodes send within kAnswerTime.
   std::deque<std::pair<std::chrono::milliseconds, Key>> due_;
   std::map<NodeId, TokenBucket> rates_;  ///< by neighbour
+  std::vector<HubAnswer> own_answers_;   ///< Limit: taken after each frame
 };
 
 }  // namespace gimnet::hub

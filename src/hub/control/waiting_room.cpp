@@ -26,14 +26,14 @@ constexpr int kBatch = 64;
 /// this much that nobody looks at.
 constexpr std::size_t kDiscardedMax = 64 * 1'024;
 
+}  // namespace
+
 void log_refusal(const PeerInfo& who, const Goodbye& goodbye) {
   log_line(LogLevel::info,
            {proto::goodbye_name(goodbye.code), log_peer(who.transport, who.address)},
            "refused " + who.transport + " " + who.address + ": " + goodbye.sentence + " (" +
                proto::goodbye_name(goodbye.code) + ")");
 }
-
-}  // namespace
 
 WaitingRoom::WaitingRoom(const Limits& limits, Judge judge, RefusalCounters& refusals)
     : limits_(limits),

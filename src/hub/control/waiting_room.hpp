@@ -17,6 +17,9 @@
 
 namespace gimnet::hub {
 
+/// The log's line about a peer that was not admitted.
+void log_refusal(const PeerInfo& who, const proto::Goodbye& goodbye);
+
 /// Peers that have not been admitted: each owns one small buffer and a deadline, nothing else.
 /// Those who say HELLO are judged; those who are refused are told why, and given a moment to read
 /// it. Thread safety: none. Ownership: of their transports until they are admitted. Limits:

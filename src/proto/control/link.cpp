@@ -24,6 +24,7 @@ enum : std::uint32_t {
   resume_taken,
   shard,
   resume_buffer_bytes,
+  former,
 };
 }  // namespace hello_key
 
@@ -140,6 +141,7 @@ void Hello::write(bitestream::Writer& writer) const {
   if (resume_taken != 0) writer.put_u64(key::resume_taken, resume_taken);
   if (shard) writer.put_u16(key::shard, *shard);
   writer.put_u32(key::resume_buffer_bytes, resume_buffer_bytes);
+  if (former != NodeId{}) writer.put_u32(key::former, former.value());
   if (introduction) write_introduction(writer, *introduction);
 }
 
@@ -161,6 +163,7 @@ Hello Hello::read(Fields& fields) {
   if (fields.has(key::shard)) hello.shard = fields.number<std::uint16_t>(key::shard, "shard", 0);
   hello.resume_buffer_bytes =
       fields.number<std::uint32_t>(key::resume_buffer_bytes, "resume buffer", kResumeBufferDefault);
+  hello.former = NodeId{fields.number<std::uint32_t>(key::former, "former id", 0)};
   hello.introduction = read_introduction(fields);
   return hello;
 }

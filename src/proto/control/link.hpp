@@ -82,6 +82,7 @@ struct Hello {
   std::uint64_t resume_taken = 0;      ///< data frames of that epoch taken from the hub
   std::optional<std::uint16_t> shard;  ///< wished for
   std::uint32_t resume_buffer_bytes = kResumeBufferDefault;
+  NodeId former;                                ///< the id that goes with the token; 0: none
   std::optional<HubIntroduction> introduction;  ///< role hub
 
   void write(bitestream::Writer& writer) const;

@@ -76,6 +76,8 @@ const char* operation_name(std::uint16_t operation) {
       return "subscribe";
     case Operation::unsubscribe:
       return "unsubscribe";
+    case Operation::let_go:
+      return "let_go";
     case Operation::watch:
       return "watch";
     case Operation::unwatch:

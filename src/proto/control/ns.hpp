@@ -29,6 +29,7 @@ enum class Operation : std::uint16_t {
   unsubscribe = 11,
   unwatch = 12,
   watch_taken = 13,
+  let_go = 14,
   service_moved = 32,
   subscribers = 33,
   name_lost = 36,

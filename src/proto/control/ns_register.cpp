@@ -27,6 +27,19 @@ UnregisterNameAnswer UnregisterNameAnswer::read(Fields& fields) {
   return {fields.opaque(5, "token", kTokenBytesMax)};
 }
 
+void LetGo::write(bitestream::Writer& writer) const {
+  if (!name.empty()) put_clean_text(writer, 3, name, kWrittenNameBytesMax);
+  writer.put_opaque(5, token);
+  if (user) writer.put_u32(6, *user);
+}
+LetGo LetGo::read(Fields& fields) {
+  LetGo message;
+  message.name = fields.text(3, "name", kNameBytesMax);
+  message.token = fields.opaque(5, "token", kTokenBytesMax);
+  if (fields.has(6)) message.user = fields.number<std::uint32_t>(6, "user", 0);
+  return message;
+}
+
 void NameLost::write(bitestream::Writer& writer) const {
   put_clean_text(writer, 3, name, kNameBytesMax);
   writer.put_u32(4, holder.value());

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -48,6 +50,27 @@ struct UnregisterNameAnswer {
   void write(bitestream::Writer& writer) const;
   [[nodiscard]] static UnregisterNameAnswer read(Fields& fields);
   friend bool operator==(const UnregisterNameAnswer&, const UnregisterNameAnswer&) = default;
+};
+
+// LET_GO: from hub to hub: end the session of that token, whose node is here now
+
+struct LetGo {
+  static constexpr std::uint16_t kOperation = request_of(Operation::let_go);
+  static constexpr const char* kName = "LET_GO";
+  std::string name;                   ///< that the node asks for; "": none
+  std::vector<std::byte> token;       ///< as the node showed it
+  std::optional<std::uint32_t> user;  ///< of the node's Unix socket; nothing: it came over TCP
+  void write(bitestream::Writer& writer) const;
+  [[nodiscard]] static LetGo read(Fields& fields);
+  friend bool operator==(const LetGo&, const LetGo&) = default;
+};
+
+struct LetGoAnswer {
+  static constexpr std::uint16_t kOperation = answer_of(Operation::let_go);
+  static constexpr const char* kName = "answer to LET_GO";
+  void write(bitestream::Writer&) const {}
+  [[nodiscard]] static LetGoAnswer read(Fields&) { return {}; }
+  friend bool operator==(const LetGoAnswer&, const LetGoAnswer&) = default;
 };
 
 // Events

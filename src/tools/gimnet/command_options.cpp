@@ -289,7 +289,8 @@ void add_commands(CLI::App& app, ToolOptions& options) {
       {"auto", Colour::automatic}, {"always", Colour::always}, {"never", Colour::never}};
   app.formatter(help_format());  // before the commands, which take it over
   app.add_option("--hub", options.hub,
-                 "tcp://host:port or unix:/path, default GIMNET_HUB, else this machine's hub")
+                 "tcp://host:port or unix:/path, or several with commas, default GIMNET_HUB, else "
+                 "this machine's hub")
       ->check(not_empty());
   app.add_option("--proxy", options.proxy,
                  "http://[user:password@]host:port to reach a tcp:// hub through, default "

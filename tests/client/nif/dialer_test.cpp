@@ -45,6 +45,27 @@ TEST(Dialer, ARefusalIsNotTriedElsewhere) {
   answering.join();
 }
 
+TEST(Dialer, AHubThatIsFullOrEndsIsNotTheLast) {
+  for (const proto::GoodbyeCode code :
+       {proto::GoodbyeCode::hub_full, proto::GoodbyeCode::draining}) {
+    FakeHub refusing;
+    FakeHub other;
+    std::vector<net::Address> addresses{*net::parse_address(refusing.url()),
+                                        *net::parse_address(other.url())};
+    std::thread answering([&] {
+      FakeConnection connection = refusing.accept();
+      EXPECT_TRUE(connection.read_hello());
+      connection.send(proto::kOpening);
+      connection.goodbye(code, "");
+      FakeConnection second = other.admit(make_welcome());
+      EXPECT_TRUE(second.wait_closed());
+    });
+    const net::WakeSignal cancel;
+    EXPECT_TRUE(admit(addresses, {}, proto::Hello{}, deadline_after(20'000), cancel));
+    answering.join();
+  }
+}
+
 TEST(Dialer, CanBeCancelled) {
   FakeHub hub;
   std::vector<net::Address> addresses{*net::parse_address(hub.url())};

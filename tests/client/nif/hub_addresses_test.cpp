@@ -31,6 +31,31 @@ TEST(HubAddresses, PrefersTheUrlThenTheEnvironmentThenTheDefaults) {
   EXPECT_NE(refused.error().sentence.find("GIMNET_HUB"), std::string::npos);
 }
 
+TEST(HubAddresses, TakesAListOfHubs) {
+  const auto urls = [](const char* list) {
+    std::vector<std::string> all;
+    const auto addresses = hub_addresses(list);
+    EXPECT_TRUE(addresses) << list;
+    if (!addresses) return all;
+    for (const net::Address& each : *addresses) all.push_back(each.url());
+    return all;
+  };
+  const std::vector<std::string> both{"tcp://a:1", "unix:/b,c"};
+  EXPECT_EQ(urls("tcp://a:1, unix:/b,c"), both) << "a path may have a comma";
+  EXPECT_EQ(urls("tcp://a:1,tcp://b:7450,tcp://c:3").size(), 3u);
+  std::string many = "tcp://a:1";
+  for (std::size_t i = 1; i < kHubsMax; ++i) many += ",tcp://a:1";
+  EXPECT_EQ(urls(many.c_str()).size(), kHubsMax);
+  many += ",tcp://a:1";
+  for (const char* wrong : {"tcp://a:1,tcp://", "tcp://a:1,nonsense", many.c_str()}) {
+    const auto refused = hub_addresses(wrong);
+    ASSERT_FALSE(refused) << wrong;
+    EXPECT_EQ(refused.error().status, NIF_BAD_ARGUMENT);
+  }
+  const Environment proxy("GIMNET_PROXY", "http://env:1");
+  EXPECT_TRUE(*proxy_to_hub(nullptr, "unix:/b,tcp://a:1"));
+}
+
 TEST(ProxyToHub, IsTheOneAskedForOrThatOfTheEnvironmentForANamedHub) {
   const Environment hub("GIMNET_HUB", "");
   const Environment proxy("GIMNET_PROXY", "http://env:1");

@@ -49,6 +49,7 @@ Hello vector_hello() {
   hello.resume_epoch = 0x99;
   hello.resume_taken = 1000;
   hello.shard = 1;
+  hello.former = NodeId{0x00700011};
   return hello;
 }
 

@@ -14,6 +14,7 @@ TEST(NsRegisterMessages, AreDecodedAndWrittenAsTheVectorsSay) {
   test::expect_answer("ns/register_answer", 9, RegisterNameAnswer{"robot/base", token()});
   test::expect_request("ns/unregister", 10, UnregisterName{});
   test::expect_answer("ns/unregister_answer", 10, UnregisterNameAnswer{token()});
+  test::expect_request("ns/let_go", 9, LetGo{"robot/base", token(), 1000});
   test::expect_request("ns/name_lost", 0,
                        NameLost{"robot/base", NodeId{0x00800012}, "it was there first"});
 }

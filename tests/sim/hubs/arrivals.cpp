@@ -42,7 +42,7 @@ void Settled::check_names() {
     for (SimNode& person : world_.operators_) {
       std::vector<NodeId> owners;
       for (const SimNode& node : world_.nodes_) {
-        const bool near = distance_[person.plan().hub][node.plan().hub] >= 0;
+        const bool near = distance_[person.plan().hub][node.at()] >= 0;
         if (near && node.is_up() && node.name() == name) owners.push_back(node.id());
       }
       const std::string words = "'" + name + "' at hub " + std::to_string(person.plan().hub);
@@ -70,7 +70,7 @@ void Settled::send_to_all() {
     const auto first = static_cast<std::size_t>(world_.random_.below(up.size()));
     for (std::size_t i = 0; i < up.size() && sent < most; ++i) {
       const SimNode& to = *up[(first + i) % up.size()];
-      const int links = distance_[from->plan().hub][to.plan().hub];
+      const int links = distance_[from->at()][to.at()];
       if (&to == from || links < 0 || links > proto::kHopsMax) continue;
       const auto number = from->send_to(to.id());
       if (!number)
@@ -93,7 +93,7 @@ void Settled::send_to_all() {
 
 void Settled::check_arrivals() const {
   const auto title = [](const SimNode& node) {
-    return node.plan().name + " at hub " + std::to_string(node.plan().hub) +
+    return node.plan().name + " at hub " + std::to_string(node.at()) +
            (node.is_up() ? "" : ", which is down") +
            (node.last().empty() ? "" : ", which " + node.last());
   };

@@ -24,6 +24,7 @@ enum class Event : std::uint8_t {
   link_added,
   other_cost,
   node_crashed,
+  moved,
   resumed,
   unsure,
   no_route,
@@ -34,12 +35,12 @@ enum class Event : std::uint8_t {
   paused_sender,
   asked_another_hub,
 };
-inline constexpr std::array<std::string_view, 24> kEventNames = {
-    "stalled",      "reset",        "cut",           "one_way",          "partition",
-    "killed",       "lost_power",   "lost_state",    "drained",          "stopped",
-    "clock_jump",   "link_removed", "link_added",    "other_cost",       "node_crashed",
-    "resumed",      "unsure",       "no_route",      "id_collision",     "copied_state",
-    "refused_name", "lost_name",    "paused_sender", "asked_another_hub"};
+inline constexpr std::array<std::string_view, 25> kEventNames = {
+    "stalled",      "reset",        "cut",        "one_way",       "partition",
+    "killed",       "lost_power",   "lost_state", "drained",       "stopped",
+    "clock_jump",   "link_removed", "link_added", "other_cost",    "node_crashed",
+    "moved",        "resumed",      "unsure",     "no_route",      "id_collision",
+    "copied_state", "refused_name", "lost_name",  "paused_sender", "asked_another_hub"};
 
 /// Counts of each. Thread safety: none.
 class Census {

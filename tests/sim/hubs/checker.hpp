@@ -21,13 +21,14 @@ enum class Checker : std::uint8_t {
   equal_tables,  ///< connected hubs know the same hubs, and have equal digests
   no_loop,       ///< the next hops lead to each hub, and nothing is dropped for its hops
   reachable,     ///< frames between all pairs arrive
+  moves,         ///< a node that goes to another hub has its name there at once
   one_owner,     ///< of connected hubs one has a name, and all say so
   resumes,       ///< nobody stays paused or held
   ledgers,       ///< each hub's ledger is exact, and those of both ends of a link agree
 };
-inline constexpr std::array<std::string_view, 13> kCheckerNames = {
-    "never_back",   "hops",    "one_link",  "right_node", "bounded", "answered", "joined",
-    "equal_tables", "no_loop", "reachable", "one_owner",  "resumes", "ledgers"};
+inline constexpr std::array<std::string_view, 14> kCheckerNames = {
+    "never_back",   "hops",    "one_link",  "right_node", "bounded",   "answered", "joined",
+    "equal_tables", "no_loop", "reachable", "moves",      "one_owner", "resumes",  "ledgers"};
 
 /// Thrown by a checker: the world is broken and stops.
 struct Broken {

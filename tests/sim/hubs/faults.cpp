@@ -11,7 +11,8 @@ namespace ctrl = proto::ctrl;
 constexpr std::uint64_t kKindsOfWires = 5;
 constexpr std::uint64_t kKindsOfChanges = 2;
 constexpr std::uint64_t kKindsOfMachines = 6;
-constexpr std::uint64_t kKinds = kKindsOfWires + kKindsOfChanges + kKindsOfMachines + 1;
+constexpr std::uint64_t kKindsOfNodes = 2;
+constexpr std::uint64_t kKinds = kKindsOfWires + kKindsOfChanges + kKindsOfMachines + kKindsOfNodes;
 constexpr std::uint64_t kStallMost = 900;
 constexpr std::uint64_t kOutageMost = 4'000;
 
@@ -26,7 +27,10 @@ void World::fault() {
   if (kind < kKindsOfChanges) return change_a_wire(kind);
   kind -= kKindsOfChanges;
   if (kind < kKindsOfMachines) return fault_of_a_machine(kind);
-  if (!nodes_.empty()) random_.pick(nodes_).crash(now_);
+  if (nodes_.empty()) return;
+  SimNode& node = random_.pick(nodes_);
+  if (kind == kKindsOfMachines) return node.crash(now_);
+  if (node.plan().moves() && node.is_up()) node.move(now_);
 }
 
 void World::fault_of_a_wire(std::uint64_t kind) {

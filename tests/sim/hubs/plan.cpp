@@ -68,6 +68,8 @@ void draw_nodes(Plan& plan, Random& random, const Size& size) {
   for (std::uint64_t i = 0; i < nodes; ++i) {
     NodePlan node;
     node.hub = static_cast<std::size_t>(random.below(plan.hubs.size()));
+    const auto other = static_cast<std::size_t>(random.below(plan.hubs.size()));
+    node.other = random.chance(300) ? other : node.hub;
     const std::uint64_t shared = random.below(kSharedNames);
     node.name = "n" + std::to_string(i);
     if (random.chance(150)) node.name = "shared" + std::to_string(shared);

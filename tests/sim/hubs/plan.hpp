@@ -31,8 +31,10 @@ struct WirePlan {
 
 struct NodePlan {
   std::size_t hub = 0;
+  std::size_t other = 0;  ///< where it goes when it moves; `hub`: it stays
   std::string name;
   std::uint32_t reads_per_ms = 0;  ///< bytes; 0: all that came
+  [[nodiscard]] bool moves() const { return other != hub; }
 };
 
 /// All that a seed draws: hubs, links, nodes, and which faults come.

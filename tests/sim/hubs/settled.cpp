@@ -33,6 +33,7 @@ void Settled::check() {
   check_wires();
   check_tables();
   for (std::size_t hub = 0; hub < world_.machines_.size(); ++hub) check_ways(hub);
+  check_moves();
   ask_names();
   send_to_all();
   check_names();

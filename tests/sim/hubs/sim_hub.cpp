@@ -110,6 +110,7 @@ std::optional<proto::Goodbye> SimHub::admit(hub::Stranger stranger, hub::MemoryP
                                             const proto::Hello& hello, milliseconds now) {
   for (hub::ShardEvent& event : turns_.take_ended()) conductor_.on_event(std::move(event), now);
   add_peer(stranger.transport.get(), std::move(peer));
+  door_.admitted = {};
   return conductor_.admit(stranger, hello, {now, wall_now_ns_()});
 }
 

@@ -51,7 +51,7 @@ class SimHub {
   /// `peer`: the far end of the stranger's stream.
   [[nodiscard]] std::optional<proto::Goodbye> admit(hub::Stranger stranger, hub::MemoryPeer peer,
                                                     const proto::Hello& hello, milliseconds now);
-  /// The last node that admit() let in.
+  /// The node that the last admit() let in; without an id: it waits for another hub.
   [[nodiscard]] const Admitted& admitted() const { return door_.admitted; }
   void on_dialled(hub::LinkNumber link, std::unique_ptr<net::Stream> stream, hub::MemoryPeer peer,
                   const proto::Welcome& welcome, milliseconds now);

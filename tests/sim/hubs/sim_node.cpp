@@ -1,6 +1,7 @@
 #include "tests/sim/hubs/sim_node.hpp"
 
 #include <iterator>
+#include <utility>
 
 #include "base/endian.hpp"
 #include "proto/control/ns.hpp"
@@ -28,7 +29,9 @@ constexpr std::uint64_t kLargeBytes = 20'000;
 void SimNode::step(SimHub* hub, milliseconds now, std::uint64_t says_every) {
   now_ = now;
   if (!up_) {
-    if (hub != nullptr && now >= back_at_) join(*hub, now);
+    if (now < back_at_) return;
+    if (hub != nullptr) return join(*hub, now);
+    if (plan_.moves()) move(now);
     return;
   }
   read(now);
@@ -58,23 +61,39 @@ void SimNode::join(SimHub& hub, milliseconds now) {
   proto::Hello hello;
   hello.role = administers_ ? proto::Role::admin : proto::Role::node;
   hello.token = token_;
+  if (!token_.empty()) hello.former = id_;
   if (wants_name_) hello.name = plan_.name;
   const auto refused = hub.admit(std::move(stranger), pipe_, hello, now);
   back_at_ = now + milliseconds{around_.random.between(50, 500)};
   if (refused) {
     around_.census.note(Event::refused_name);
     last_ = "was refused at " + std::to_string(now.count()) + ": " + refused->sentence;
+    if (plan_.moves()) return;
     token_.clear();
     wants_name_ = around_.random.chance(500);
     return;
   }
   wants_name_ = true;
   up_ = true;
+  // One that is to be let go elsewhere first learns its id by WELCOME.
+  waits_ = hub.admitted().node == NodeId{};
+  if (!waits_) begin_session(hub.admitted().node, hub.admitted().new_session);
+}
+
+void SimNode::begin_session(NodeId id, bool new_session) {
+  if (!token_.empty() && hub_of(id) != hub_of(id_)) around_.census.note(Event::moved);
   // A hub that was started again knows the session no more, and its token gives the id back.
-  const bool same = id_ == hub.admitted().node && !token_.empty();
-  id_ = hub.admitted().node;
-  session_ = around_.book.note_session(plan_.hub, id_, !same);
-  if (hub.admitted().new_session) group_.reset();
+  const bool same = id_ == id && !token_.empty();
+  id_ = id;
+  session_ = around_.book.note_session(at_, id_, !same);
+  if (new_session) group_.reset();
+}
+
+void SimNode::move(milliseconds now) {
+  at_ = at_ == plan_.hub ? plan_.other : plan_.hub;
+  up_ = false;
+  last_ = "moved at " + std::to_string(now.count());
+  back_at_ = now + milliseconds{around_.random.between(1, 50)};
 }
 
 void SimNode::crash(milliseconds now) {
@@ -131,6 +150,7 @@ void SimNode::take(const proto::FrameHeader& header, std::span<const std::byte> 
     case Kind::link:
       if (const auto welcome = proto::decode<proto::Welcome>(payload)) {
         welcomed_ = true;
+        if (std::exchange(waits_, false)) begin_session(welcome->node, true);
         name_ = welcome->name;
         token_ = welcome->token;
         if (!administers_ && around_.random.chance(400)) offer();
@@ -244,7 +264,7 @@ std::optional<std::uint64_t> SimNode::send(Kind kind, std::uint32_t dst, std::ui
                                            std::uint64_t bytes_most, proto::Policy policy) {
   if (paused_.contains({kind, Lane::normal, dst})) return std::nullopt;
   const std::uint64_t bytes = Book::kNumberBytes + around_.random.below(bytes_most);
-  const std::uint64_t number = around_.book.note_sent(plan_.hub, session);
+  const std::uint64_t number = around_.book.note_sent(at_, session);
   std::vector<std::byte> payload(static_cast<std::size_t>(bytes));
   store_le(payload.data(), number);
   const auto flags = static_cast<std::uint8_t>(policy) | unsigned{proto::kFlagReport};

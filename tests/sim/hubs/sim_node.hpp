@@ -27,15 +27,19 @@ class SimNode {
     Census& census;
   };
   SimNode(const Around& around, const NodePlan& plan, bool administers)
-      : around_(around), plan_(plan), administers_(administers) {}
+      : around_(around), plan_(plan), administers_(administers), at_(plan.hub) {}
 
   /// `hub`: null while it does not run. `says_every`: ms between two messages, 0: it says nothing.
   void step(SimHub* hub, milliseconds now, std::uint64_t says_every);
   /// Its process ends, and comes back later with or without its memory.
   void crash(milliseconds now);
+  /// It dials its other hub, and the one where it was hears nothing of it.
+  void move(milliseconds now);
 
   [[nodiscard]] bool is_up() const { return up_ && welcomed_; }
   [[nodiscard]] const NodePlan& plan() const { return plan_; }
+  /// The hub at which it is, or which it dials.
+  [[nodiscard]] std::size_t at() const { return at_; }
   [[nodiscard]] NodeId id() const { return id_; }
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] const std::string& last() const { return last_; }
@@ -59,6 +63,7 @@ class SimNode {
     std::string name;  ///< that was to be resolved
   };
   void join(SimHub& hub, milliseconds now);
+  void begin_session(NodeId id, bool new_session);
   void say();
   void ask_something();
   void offer();
@@ -75,10 +80,12 @@ class SimNode {
   const Around around_;
   const NodePlan plan_;
   const bool administers_;
+  std::size_t at_;
   std::string last_;  ///< how its last connection ended
   std::string goodbye_;
   bool up_ = false;
   bool welcomed_ = false;
+  bool waits_ = false;  ///< until the hub that had it lets go of it
   hub::MemoryPeer pipe_;
   std::vector<std::byte> stream_;
   bool opened_ = false;

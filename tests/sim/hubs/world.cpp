@@ -32,7 +32,7 @@ World::World(const Options& options)
   const SimNode::Around around{random_, book_, census_};
   for (const NodePlan& each : plan_.nodes) nodes_.emplace_back(around, each, false);
   for (std::size_t hub = 0; hub < machines_.size(); ++hub)
-    operators_.emplace_back(around, NodePlan{hub, "operator" + std::to_string(hub), 0}, true);
+    operators_.emplace_back(around, NodePlan{hub, hub, "operator" + std::to_string(hub), 0}, true);
 }
 
 /// Of a hub that has no state.
@@ -96,7 +96,7 @@ void World::step() {
   }
   for (std::size_t i = 0; i < lines_.size(); ++i) carry(*lines_[i]);
   std::erase_if(lines_, [this](const auto& line) { return is_over(*line); });
-  for (SimNode& node : nodes_) node.step(hub(node.plan().hub), now_, faults_ ? plan_.say_every : 0);
+  for (SimNode& node : nodes_) node.step(hub(node.at()), now_, faults_ ? plan_.say_every : 0);
   for (SimNode& node : operators_) node.step(hub(node.plan().hub), now_, 0);
   // Another one begins each time.
   const std::size_t first = static_cast<std::size_t>(now_.count()) % machines_.size();

@@ -121,7 +121,7 @@ class World {
   bool faults_ = true;                     ///< they may come, and nodes speak by themselves
 };
 
-/// Looks at a world that was left alone: settled.cpp, arrivals.cpp.
+/// Looks at a world that was left alone: settled.cpp, moves.cpp, arrivals.cpp.
 class Settled {
  public:
   explicit Settled(World& world);
@@ -141,6 +141,7 @@ class Settled {
   void check_ways(std::size_t from) const;
   [[nodiscard]] std::optional<int> follow(std::size_t from, std::size_t to) const;
   void find_distances();
+  void check_moves();
   void ask_names();
   void check_names();
   void send_to_all();

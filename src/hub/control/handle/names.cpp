@@ -117,6 +117,17 @@ proto::Payload handle_unregister(HandlerContext& context, const Request& request
       });
 }
 
+proto::Payload handle_let_go(HandlerContext& context, const Request& request) {
+  return answer_to<ns::LetGo>(
+      request, [&](const ns::LetGo& wanted) -> Result<ns::LetGoAnswer, proto::Refusal> {
+        const Identity identity = wanted.user ? Identity::of_user(*wanted.user) : Identity::open();
+        if (context.membership.let_go({wanted.token, wanted.name, identity, context.wall},
+                                      context.now, context.effects))
+          return ns::LetGoAnswer{};
+        return proto::Refusal{Status::not_found, "the token is not honoured at this hub"};
+      });
+}
+
 proto::Payload handle_resolve(HandlerContext& context, const Request& request) {
   return answer_to<ns::Resolve>(
       request, [&](const ns::Resolve& wanted) { return resolve(context, request, wanted.name); });

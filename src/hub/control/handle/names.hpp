@@ -8,6 +8,7 @@ namespace gimnet::hub {
 
 [[nodiscard]] proto::Payload handle_register(HandlerContext& context, const Request& request);
 [[nodiscard]] proto::Payload handle_unregister(HandlerContext& context, const Request& request);
+[[nodiscard]] proto::Payload handle_let_go(HandlerContext& context, const Request& request);
 [[nodiscard]] proto::Payload handle_resolve(HandlerContext& context, const Request& request);
 [[nodiscard]] proto::Payload handle_reverse(HandlerContext& context, const Request& request);
 [[nodiscard]] proto::Payload handle_list(HandlerContext& context, const Request& request);

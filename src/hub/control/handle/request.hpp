@@ -51,6 +51,7 @@ struct HandlerContext {
   Administration* administration = nullptr;          ///< or none
   NetworkView* network = nullptr;                    ///< or none: a hub alone
   const NetworkNames* names = nullptr;               ///< or none: a hub alone
+  std::chrono::milliseconds wall{};                  ///< since 1970
   std::optional<CountsBegin> counts{};               ///< what begins with the answer
   std::optional<GroupId> joins{};  ///< of another hub: the answer waits for its messages
 };

@@ -158,4 +158,10 @@ Result<HubStart> next_start(const HubState& found, std::chrono::milliseconds wal
   return start;
 }
 
+std::uint64_t epoch_of(const HubStart& start) {
+  const std::uint64_t epoch =
+      load_le<std::uint64_t>(start.state.unique_id.data()) + start.state.boot;
+  return epoch != 0 ? epoch : 1;
+}
+
 }  // namespace gimnet::hub

@@ -57,4 +57,7 @@ struct HubStart {
 /// tokens have expired by `wall` (since 1970). Errors: the boot number is at its end.
 [[nodiscard]] Result<HubStart> next_start(const HubState& found, std::chrono::milliseconds wall);
 
+/// Never 0, and another one at each start, also of a hub that keeps nothing.
+[[nodiscard]] std::uint64_t epoch_of(const HubStart& start);
+
 }  // namespace gimnet::hub

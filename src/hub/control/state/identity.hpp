@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 namespace gimnet::hub {
@@ -17,6 +18,10 @@ class Identity {
   [[nodiscard]] static constexpr Identity of_user(std::uint32_t user) { return {Kind::user, user}; }
 
   [[nodiscard]] constexpr bool is_user() const { return kind_ == Kind::user; }
+  /// Nothing: no user of this machine.
+  [[nodiscard]] constexpr std::optional<std::uint32_t> user() const {
+    return is_user() ? std::optional{user_} : std::nullopt;
+  }
   /// "uid 1000", "open" or "unknown". The MAC of a token covers these bytes (docs/protocol.md,
   /// section 3): other ones would make void each token that was given out before.
   [[nodiscard]] std::string text() const {

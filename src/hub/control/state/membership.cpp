@@ -35,7 +35,8 @@ Result<Membership::Joined, proto::Goodbye> Membership::join(const JoinRequest& r
   const Sessions::Claim claim =
       sessions_.claim({request.token, request.name, request.identity, request.wall});
   if (!request.name.empty()) {
-    if (std::optional<proto::Goodbye> refusal = name_refusal(request.name, claim.session, now)) {
+    if (std::optional<proto::Goodbye> refusal =
+            name_refusal(request.name, claim.session, request.former, now)) {
       return std::move(*refusal);
     }
   }
@@ -116,7 +117,7 @@ std::optional<proto::Refusal> Membership::rename(Session& session, const std::st
                                                  milliseconds now, Effects& effects) {
   if (name == session.name) return std::nullopt;
   if (!name.empty()) {
-    if (const std::optional<proto::Goodbye> refusal = name_refusal(name, &session, now)) {
+    if (const std::optional<proto::Goodbye> refusal = name_refusal(name, &session, {}, now)) {
       const proto::Status status = refusal->code == GoodbyeCode::name_taken ? proto::Status::taken
                                    : refusal->code == GoodbyeCode::hub_full
                                        ? proto::Status::limit

@@ -40,6 +40,7 @@ struct JoinRequest {
   std::string crowd;     ///< that the peer counts in: its address, or its user; "": none
   bool resumes = false;  ///< it asks for resume
   std::chrono::milliseconds wall{};  ///< since 1970: tokens expire by it
+  NodeId former;  ///< the id that the node had; at this hub or another one; 0: none
 };
 
 /// Who belongs to this hub, under which name, with which services: the state of one hub without its
@@ -79,6 +80,11 @@ class Membership {
   /// restart, unless the answer says why not. `sentence` tells its node who did it and what to do.
   std::string kick(Session& session, const std::string& sentence, std::chrono::milliseconds now,
                    Effects& effects, const KeepNow& keep = {});
+
+  /// A node of this hub has shown its token to another hub, and is its node from now on: its
+  /// session ends, and its token counts as none. False: the token is not honoured here.
+  [[nodiscard]] bool let_go(const Sessions::Presented& presented, std::chrono::milliseconds now,
+                            Effects& effects);
 
   /// The session's node goes on under another index, with name, services, subscriptions and token.
   /// Errors: taken (held, at rest, or perhaps that of a node that has not come back since a
@@ -146,12 +152,12 @@ class Membership {
                                                            const Sessions::Claim& claim,
                                                            std::chrono::milliseconds now,
                                                            Effects& effects);
-  /// Why `claimant` (nullptr: somebody new) cannot have the name.
+  /// Why `claimant` (nullptr: somebody new) cannot have the name. `former`: its id before, 0: none.
   [[nodiscard]] std::optional<proto::Goodbye> name_refusal(std::string_view name,
-                                                           const Session* claimant,
+                                                           const Session* claimant, NodeId former,
                                                            std::chrono::milliseconds now) const;
   /// The same, for what other hubs and services have.
-  [[nodiscard]] std::optional<proto::Goodbye> network_refusal(std::string_view name,
+  [[nodiscard]] std::optional<proto::Goodbye> network_refusal(std::string_view name, NodeId former,
                                                               std::chrono::milliseconds now) const;
   /// Is nobody waiting for the session's node to come back?
   [[nodiscard]] static bool ends_with_connection(const Session& session, const Ending& ending);

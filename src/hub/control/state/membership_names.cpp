@@ -22,14 +22,14 @@ std::string holder_of(const KnownName& known) {
 }  // namespace
 
 std::optional<proto::Goodbye> Membership::name_refusal(std::string_view name,
-                                                       const Session* claimant,
+                                                       const Session* claimant, NodeId former,
                                                        milliseconds now) const {
   if (auto refusal = directory_.refusal(name, claimant, sessions_, now)) return refusal;
   if (claimant != nullptr && claimant->name == name) return std::nullopt;
-  return network_refusal(name, now);
+  return network_refusal(name, former, now);
 }
 
-std::optional<proto::Goodbye> Membership::network_refusal(std::string_view name,
+std::optional<proto::Goodbye> Membership::network_refusal(std::string_view name, NodeId former,
                                                           milliseconds now) const {
   if (const Topic* topic = services_.find(name); topic != nullptr && topic->provided())
     return taken(quoted(name) + "is the full name of a service");
@@ -46,6 +46,7 @@ std::optional<proto::Goodbye> Membership::network_refusal(std::string_view name,
   if (known->standing == proto::ns::NameStanding::held)
     return taken(quoted(name) + "is held by " + holder_of(*known));
   if (known->standing == proto::ns::NameStanding::away) return std::nullopt;
+  if (known->claim->node == former) return std::nullopt;  // nobody can be asked for a better proof
   const auto left = std::max<std::int64_t>(1, (known->until - now).count() / 1'000);
   return taken(quoted(name) + "is that of " + holder_of(*known) +
                ", which cannot be reached; it is free in " + std::to_string(left) +
@@ -64,6 +65,20 @@ std::optional<proto::Refusal> Membership::service_name_refusal(std::string_view 
   return proto::Refusal{proto::Status::taken, "the full name of the service, '" +
                                                   std::string{full_name} + "', is the name of " +
                                                   holder + "; choose another name"};
+}
+
+bool Membership::let_go(const Sessions::Presented& presented, milliseconds now, Effects& effects) {
+  const Sessions::Claim claim = sessions_.claim(presented);
+  if (claim.token) sessions_.spend_token(*claim.token);
+  if (claim.session == nullptr) return claim.token.has_value();
+  sessions_.spend_token(*claim.session);
+  if (claim.session->connected)
+    effects.emplace_back(
+        CloseDue{claim.session->place, GoodbyeCode::replaced,
+                 "another connection has shown the token at another hub of the network, and is "
+                 "this node now; do not come back by yourself"});
+  end(*claim.session, now, effects);
+  return true;
 }
 
 void Membership::lose_name(const std::string& name, NodeId holder, const std::string& sentence,

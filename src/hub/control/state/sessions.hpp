@@ -193,6 +193,8 @@ class Sessions {
                    Declared declared = Declared::nothing);
   /// Tokens of the session count as none from now on.
   void spend_token(const Session& session);
+  /// The same for a session that is not there.
+  void spend_token(const SessionToken& token) { floor_.raise(token.index, token.number + 1); }
   /// The same, also after a restart, for as long as limits.kicked_tokens allows. False: it does not
   /// allow that now.
   [[nodiscard]] bool remember_kicked(const Session& session);

@@ -167,6 +167,11 @@ void NameCopies::drop(HubId hub) {
   ++dropped_copies_;
 }
 
+void NameCopies::note_let_go(std::string_view name, HubId hub) {
+  const auto known = hub == options_.self.hub ? std::nullopt : index_.find(name, hub);
+  if (known && (*known)->second.state == NameState::held) (*known)->second.state = NameState::away;
+}
+
 void NameCopies::set_hub_name(HubId hub, std::string_view name) {
   const auto found = copies_.find(hub);
   if (found != copies_.end() && found->second.hub_name != name) found->second.hub_name = name;

@@ -97,6 +97,8 @@ class NameCopies {
   /// These hubs can be reached now, besides this one. REQUIRES: ascending, each hub id once.
   /// Answers those whose copy has begun, or may go on.
   std::vector<HubId> set_reachable(std::span<const HubRun> hubs, std::chrono::milliseconds now);
+  /// That hub has let go of the name, and says so in its own time: until then its node is away.
+  void note_let_go(std::string_view name, HubId hub);
   /// Names the hub for people.
   void set_hub_name(HubId hub, std::string_view name);
   /// "": it is not known.

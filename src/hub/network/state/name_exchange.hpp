@@ -42,6 +42,7 @@ class NameExchange {
   void set_reachable(std::span<const HubRun> hubs, std::chrono::milliseconds now);
   void put_own(std::string_view name, const proto::route::NameClaim& claim);
   void remove_own(std::string_view name);
+  void note_let_go(std::string_view name, HubId hub) { copies_.note_let_go(name, hub); }
   /// Takes another hub id: all own names are to be put again. REQUIRES: no link.
   void renumber(HubId hub);
   /// A hub that dials has started: names may be missing.

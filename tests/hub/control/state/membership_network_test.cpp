@@ -58,6 +58,50 @@ TEST_F(MembershipNetworkTest, AnUnreachableNameIsRefusedWithTheTimeThatIsLeft) {
   EXPECT_NE(refusal->sentence.find("free in 20 s"), std::string::npos) << refusal->sentence;
 }
 
+TEST_F(MembershipNetworkTest, ANodeThatComesFromAHubThatIsAwayHasItsNameAtOnce) {
+  put("robot", 1);
+  JoinRequest request;
+  request.name = "robot";
+  request.identity = Identity::open();
+  request.former = make_id<NodeId>(kOther.hub, 1);
+  EXPECT_FALSE(membership_.join(request, 1s, effects_)) << "its hub can be asked";
+  (void)names_.set_reachable({}, milliseconds(0));
+  request.former = make_id<NodeId>(kOther.hub, 2);
+  EXPECT_FALSE(membership_.join(request, 1s, effects_)) << "it was another node's";
+  request.former = make_id<NodeId>(kOther.hub, 1);
+  EXPECT_TRUE(membership_.join(request, 1s, effects_));
+}
+
+TEST_F(MembershipNetworkTest, ANameThatItsHubLetGoOfIsFreeAndHasTheHigherRank) {
+  put("robot", 1);
+  names_.note_let_go("robot", kOther.hub);
+  Session* node = join("robot");
+  ASSERT_NE(node, nullptr);
+  proto::route::NameClaim claim;
+  claim.node = make_id(HubId{7}, node->index);
+  names_.put_own("robot", claim);
+  EXPECT_EQ(names_.find("robot")->claim->node, claim.node);
+  EXPECT_EQ(names_.find("robot")->claim->rank,
+            names_.find_node(make_id<NodeId>(kOther.hub, 1))->claim->rank + 1);
+}
+
+TEST_F(MembershipNetworkTest, ASessionIsLetGoForItsTokenAloneAndOnce) {
+  Session* node = join("robot");
+  membership_.sessions().renew_token(*node, 1s);
+  const std::vector<std::byte> token = membership_.sessions().token_of(*node);
+  const Place place = node->place;
+  effects_.clear();
+  EXPECT_FALSE(membership_.let_go({token, "robot", Identity::of_user(7), 1s}, 1s, effects_));
+  EXPECT_TRUE(effects_.empty());
+  EXPECT_TRUE(membership_.let_go({token, "robot", Identity::open(), 1s}, 1s, effects_));
+  EXPECT_FALSE(membership_.directory().find("robot"));
+  const auto* closed = std::get_if<CloseDue>(&effects_.front());
+  ASSERT_NE(closed, nullptr);
+  EXPECT_EQ(closed->place.slot, place.slot);
+  EXPECT_EQ(closed->code, proto::GoodbyeCode::replaced);
+  EXPECT_FALSE(membership_.let_go({token, "robot", Identity::open(), 1s}, 1s, effects_));
+}
+
 TEST_F(MembershipNetworkTest, NodesAndFullNamesOfServicesExcludeEachOther) {
   put("robot/laser", 1, proto::route::NameState::held, make_id<GroupId>(kOther.hub, 1));
   put("other/laser", 2);
