@@ -144,12 +144,13 @@ GIMNET_API gimi_status gimi_accept(gimi_handle node, const char* name,
                                    const gimi_accept_options* options, gimi_handle* queue);
 /** A stream to who accepts the service of that full name, with its key. It follows the service to
  * another node. GIMI_NOT_FOUND (no such service now, or one that gives data), GIMI_BAD_NAME,
- * GIMI_BAD_ARGUMENT, GIMI_LIMIT, GIMI_TIMEOUT, GIMI_NOT_CONNECTED. */
+ * GIMI_BAD_ARGUMENT (also other options than an earlier sender of this node to it), GIMI_LIMIT,
+ * GIMI_TIMEOUT, GIMI_NOT_CONNECTED. */
 GIMNET_API gimi_status gimi_sender_to_service(gimi_handle node, const char* full_name,
                                               const gimi_send_options* options, int32_t timeout_ms,
                                               gimi_handle* sender);
-/** A stream to a node. Several of one (peer, key), or of one service, are one stream with the
- * options of the first. GIMI_BAD_ARGUMENT, GIMI_LIMIT. */
+/** A stream to a node. Several of one (peer, key), or of one service, are one stream; the options
+ * of the first hold as long as the node lives, and others are GIMI_BAD_ARGUMENT. GIMI_LIMIT. */
 GIMNET_API gimi_status gimi_sender(gimi_handle node, gimi_peer to, const gimi_send_options* options,
                                    gimi_handle* sender);
 /** Sends 0 bytes to 1 GiB. GIMI_OK: it is on its way; of a synchronized stream, gimi_settle() and

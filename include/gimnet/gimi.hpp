@@ -96,31 +96,29 @@ class Node : public HubAccess {
 
   // ---- sending
 
-  /// A stream to a node. Errors: bad_argument, limit.
+  /// A stream to a node, which find() finds. Errors: bad_argument (also other options than an
+  /// earlier Sender of this node to that peer with that key), limit.
   Outcome<Sender> sender(Peer to, const SendOptions& options = {}) const {
     const gimi_send_options how = detail::options_of(options);
     return detail::made<Sender>(
         [&](gimi_handle* made) { return gimi_sender(handle_, to.id, &how, made); });
   }
-  /// To a name or an id as text (`7.17`). Errors: as find().
-  Outcome<Sender> sender(std::string_view to, const SendOptions& options = {},
-                         Timeout timeout = Timeout{5000}) const {
-    const auto peer = find(to, timeout);
-    if (!peer) return peer.failure();
-    return sender(*peer, options);
-  }
   /// To who accepts the service of that full name, with its key (SendOptions::key counts for
   /// nothing). Every node of the network may send there; the hub of the service routes it (kind
   /// SERVICE, docs/protocol.md, section 2). The node follows it as a subscriber; of services
   /// without a Sender it keeps the latest 1,024. Errors: not_found (no such service now, or one
-  /// that gives data), bad_name, bad_argument, limit, timeout, not_connected.
-  Outcome<Sender> sender_to_service(std::string_view full_name, const SendOptions& options = {},
-                                    Timeout timeout = Timeout{5000}) const {
+  /// that gives data), bad_name, bad_argument (as above), limit, timeout, not_connected.
+  Outcome<Sender> sender(std::string_view service, const SendOptions& options = {},
+                         Timeout timeout = Timeout{5000}) const {
     const gimi_send_options how = detail::options_of(options);
     return detail::made<Sender>([&](gimi_handle* made) {
-      return gimi_sender_to_service(handle_, std::string(full_name).c_str(), &how,
+      return gimi_sender_to_service(handle_, std::string(service).c_str(), &how,
                                     milliseconds_of(timeout), made);
     });
+  }
+  Outcome<Sender> sender_to_service(std::string_view service, const SendOptions& options = {},
+                                    Timeout timeout = Timeout{5000}) const {
+    return sender(service, options, timeout);
   }
   /// Sends one message; sender() and Sender::send() in one.
   Outcome<void> send(Peer to, BytesView data, const SendOptions& options = {},
@@ -129,11 +127,12 @@ class Node : public HubAccess {
     const gimi_bytes bytes{data.data(), data.size()};
     return detail::outcome_of(gimi_send_to(handle_, to.id, &bytes, &how, milliseconds_of(timeout)));
   }
-  Outcome<void> send(std::string_view to, BytesView data, const SendOptions& options = {},
+  /// The hub is asked for a service to which this node did not send before.
+  Outcome<void> send(std::string_view service, BytesView data, const SendOptions& options = {},
                      Timeout timeout = kForever) const {
-    const auto peer = find(to, timeout);
-    if (!peer) return peer.failure();
-    return send(*peer, data, options, timeout);
+    const auto there = sender(service, options, timeout);
+    if (!there) return there.failure();
+    return there->send(data, timeout);
   }
   /// Writes what More::yes held back. Does not wait. Errors: not_connected, refused (no connection
   /// will come any more), closed.

@@ -107,7 +107,7 @@ struct SendCounts {
 
 /// A stream of messages with one key, to one node or to whoever accepts one service. Several
 /// Senders of one (peer, key), or of one service, of a node are one stream: they share sequence,
-/// window and counts; the options of the first hold. One to a service follows it: while nobody has
+/// window and counts. The options of the first hold as long as the node lives; others are refused. One to a service follows it: while nobody has
 /// the service, send() answers not_found; when it is back, under whichever node and group, messages
 /// go there. Messages not acknowledged at its former place count as lost.
 class Sender {
@@ -264,8 +264,7 @@ class Subscription {
   [[nodiscard]] Queue queue() const { return Queue(handle_); }
   /// Is there a provider at the moment?
   [[nodiscard]] bool exists() const { return provider() == GIMI_PROVIDES; }
-  /// Is there one who takes data under that name instead? Nothing will come from it; send to it
-  /// (sender_to_service()).
+  /// Is there one who takes data under that name instead? Nothing will come from it; send to it.
   [[nodiscard]] bool accepts() const { return provider() == GIMI_ACCEPTS; }
   /// Waits until there is. Errors: timeout, closed.
   Outcome<void> wait_until_exists(Timeout timeout = kForever) const {

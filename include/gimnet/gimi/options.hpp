@@ -127,6 +127,7 @@ struct SendOptions {
   /// not_delivered, for streams in which what comes later is worth nothing without what came
   /// before.
   bool end_at_loss = false;
+  friend bool operator==(const SendOptions&, const SendOptions&) = default;
 };
 
 struct PublishOptions {

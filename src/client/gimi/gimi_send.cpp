@@ -35,6 +35,11 @@ namespace gimnet::gimi {
 Outcome<StreamTable::Stream> stream_to_service(Core& core, const std::string& name,
                                                const SendOptions& options, Timeout timeout,
                                                const OnPlace& on_place) {
+  if (name.find('/') == std::string::npos) {
+    return Failure{Status::bad_name, "cannot send to '" + name +
+                                         "': a text names a service, as in robot/drive; find() "
+                                         "gives the node of a name"};
+  }
   const auto found = list_services(core.node(), name, timeout);
   if (!found) return found.failure();
   // The listing takes patterns, too: only the service of that very name counts.
@@ -92,9 +97,14 @@ gimi_status gimi_sender_to_service(gimi_handle node, const char* full_name,
   *sender = 0;
   return with<NodeObject>(node, [&](NodeObject& found) {
     return with_send_options(options, [&](const SendOptions& how) {
-      auto stream = stream_to_service(*found.core, full_name, how, timeout_of(timeout_ms));
-      if (!stream) return fail(stream.failure());
-      return give<SenderObject>(sender, found.core, std::move(*stream));
+      StreamTable::Stream stream = found.core->streams().standing(full_name);
+      if (stream == nullptr) {
+        auto made = stream_to_service(*found.core, full_name, how, timeout_of(timeout_ms));
+        if (!made) return fail(made.failure());
+        stream = std::move(*made);
+      }
+      if (const auto failure = conflict(*stream, how)) return fail(*failure);
+      return give<SenderObject>(sender, found.core, std::move(stream));
     });
   });
 }

@@ -66,6 +66,7 @@ class SendStream {
       GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] Outcome<void> settle(Timeout timeout) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] SendCounts counts() GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] const SendOptions& options() const { return options_; }
   /// Nobody, of a stream to a service.
   [[nodiscard]] Peer to() const { return to_; }
   /// "" of a stream to a node.

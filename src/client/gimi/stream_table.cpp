@@ -28,6 +28,20 @@ bool is_route_gone(std::uint32_t reason) {
 
 }  // namespace
 
+std::optional<Failure> conflict(const SendStream& standing, const SendOptions& options) {
+  SendOptions wanted = options;
+  // The service says its key.
+  if (!standing.service().empty()) wanted.key = standing.options().key;
+  if (wanted == standing.options()) return std::nullopt;
+  const bool to_service = !standing.service().empty();
+  return Failure{Status::bad_argument,
+                 "cannot send to " + (to_service ? standing.service() : standing.to().text()) +
+                     " with these options: this node sends there with others" +
+                     (to_service ? "" : ", with the same key") +
+                     "; they hold as long as it lives, so take the same ones" +
+                     (to_service ? "" : " or another key")};
+}
+
 std::optional<Failure> StreamTable::obstacle(const SendOptions& options) const {
   if (options.window > kWindowMax) {
     return Failure{Status::bad_argument,
@@ -49,7 +63,10 @@ Outcome<StreamTable::Stream> StreamTable::stream(Peer to, const SendOptions& opt
   const MutexLock lock(mutex_);
   const StreamName name{to, options.key, 0};
   const auto place = streams_.find(name);
-  if (place != streams_.end()) return place->second;
+  if (place != streams_.end()) {
+    if (auto failure = conflict(*place->second, options)) return *failure;
+    return place->second;
+  }
   if (auto failure = obstacle(options)) return *failure;
   return streams_.emplace(name, std::make_shared<SendStream>(uplink_, *this, to, options))
       .first->second;
@@ -108,6 +125,14 @@ void StreamTable::on_service_moved(const std::string& full_name, const ServicePl
     if (place.destination() != 0) by_group_[place.group] = stream;
   }
   stream->on_moved(place);
+}
+
+StreamTable::Stream StreamTable::standing(const std::string& full_name) {
+  const MutexLock lock(mutex_);
+  const auto known = services_.find(full_name);
+  if (known == services_.end() || known->second.stream->group() == 0) return nullptr;
+  known->second.asked = ++asked_;
+  return known->second.stream;
 }
 
 StreamTable::Stream StreamTable::find(const StreamName& name) {

@@ -15,6 +15,10 @@
 
 namespace gimnet::gimi {
 
+/// Why a stream cannot be taken by who has those options; nothing if it can: streams share them.
+[[nodiscard]] std::optional<Failure> conflict(const SendStream& standing,
+                                              const SendOptions& options);
+
 /// All streams that a node sends. Thread safety: any thread. Streams to nodes live as long as the
 /// table, those to services until another one needs their place.
 class StreamTable final : public StreamKeeper {
@@ -32,6 +36,8 @@ class StreamTable final : public StreamKeeper {
       : uplink_(uplink), attend_(std::move(attend)) {}
 
   [[nodiscard]] Outcome<Stream> stream(Peer to, const SendOptions& options) GIMNET_EXCLUDES(mutex_);
+  /// To the service of that full name, if the node sends there already and somebody has it.
+  [[nodiscard]] Stream standing(const std::string& full_name) GIMNET_EXCLUDES(mutex_);
   /// To whoever accepts the service of that full name, which is at `place` now.
   [[nodiscard]] Outcome<Stream> service_stream(const std::string& full_name,
                                                const ServicePlace& place,

@@ -158,7 +158,7 @@ class ViewerPort final : public GimiPort {
       SendOptions options;
       options.lane = Lane::real_time;
       Outcome<Sender> sender =
-          node().sender_to_service(fmt::format("{}/{}", robot_, kDriveName), options, kSend);
+          node().sender(fmt::format("{}/{}", robot_, kDriveName), options, kSend);
       if (!sender) return Error{sender.failure().sentence};
       drive_.emplace(std::move(*sender));
     }

@@ -165,7 +165,7 @@ ExitCode run_send(ToolSession& session) {
   stream.lane = options.lane;
   stream.window = kWindow;
   stream.end_at_loss = true;
-  const auto sender = to_service ? session.node().sender_to_service(options.target, stream)
+  const auto sender = to_service ? session.node().sender(options.target, stream)
                                  : session.node().sender(*peer, stream);
   if (!sender) return session.fail(sender.failure());
   Unsent unsent = Unsent::nothing;

@@ -70,7 +70,7 @@ TEST_F(NodeTest, ItsThreadsTakeNoSignals) {
   const auto before = tasks();
   const Node node = join("robot");
   const Node viewer = join();
-  viewer.sender("robot").or_throw().send("x").or_throw();
+  viewer.send(node.peer(), "x").or_throw();
   // All but SIGKILL, SIGSTOP, and the two that belong to the C library.
   constexpr std::uint64_t kAll =
       ~((1ull << (SIGKILL - 1)) | (1ull << (SIGSTOP - 1)) | (3ull << 31));
@@ -113,19 +113,42 @@ TEST_F(NodeTest, SaysWhyItCannotJoin) {
   EXPECT_TRUE(Node::join(options).is(Status::bad_argument));
 }
 
-TEST_F(NodeTest, SendsByNameAndById) {
+TEST_F(NodeTest, SendsToANodeThatWasFound) {
   const Node sender = join();
   const Node receiver = join("B");
-  sender.send("B", "by name").or_throw();
+  sender.send(sender.find("B").or_throw(), "by name").or_throw();
   sender.send(receiver.peer(), "by id").or_throw();
-  sender.send(receiver.peer().text(), "by id as text").or_throw();
+  sender.send(sender.find(receiver.peer().text()).or_throw(), "by id as text").or_throw();
   for (const char* text : {"by name", "by id", "by id as text"}) {
     const auto message = receiver.receive(MessageKey{}, kWait);
     ASSERT_TRUE(message);
     EXPECT_EQ(message->text(), text);
     EXPECT_EQ(message->from(), sender.peer());
   }
-  EXPECT_TRUE(sender.send("nobody", "x").is(Status::not_found));
+  const auto refused = sender.send("B", "a text names a service");
+  ASSERT_TRUE(refused.is(Status::bad_name));
+  EXPECT_NE(refused.failure().sentence.find("find()"), std::string::npos);
+  EXPECT_TRUE(sender.send("nobody/drive", "x").is(Status::not_found));
+}
+
+TEST_F(NodeTest, RefusesASecondSenderWithOtherOptions) {
+  const Node sender = join();
+  const Node receiver = join("B");
+  const Queue drive = receiver.accept("drive").or_throw();
+  const SendOptions synchronized{.window = 2};
+  sender.send(receiver.peer(), "1", synchronized).or_throw();
+  sender.send(receiver.peer(), "2", synchronized).or_throw();
+  const auto refused = sender.send(receiver.peer(), "3");
+  ASSERT_TRUE(refused.is(Status::bad_argument));
+  EXPECT_NE(refused.failure().sentence.find("another key"), std::string::npos);
+  EXPECT_TRUE(sender.sender(receiver.peer(), {.key = {1, 0}})) << "that is another stream";
+  sender.send("B/drive", "1", synchronized).or_throw();
+  sender.send("B/drive", "2", synchronized).or_throw();
+  const auto other = sender.sender("B/drive");
+  ASSERT_TRUE(other.is(Status::bad_argument));
+  EXPECT_NE(other.failure().sentence.find("B/drive"), std::string::npos);
+  for (const char* text : {"1", "2", "1", "2"})
+    EXPECT_EQ(drive.receive(kWait).or_throw().text(), text) << "of one key and of the service";
 }
 
 TEST_F(NodeTest, StampsMessages) {
@@ -148,7 +171,7 @@ TEST_F(NodeTest, AcknowledgedMessagesArriveInOrder) {
   const Queue queue = receiver.queue({}, {100000, AtFullQueue::stop_reading});
   SendOptions options;
   options.window = 5;
-  const Sender stream = sender.sender("B", options).or_throw();
+  const Sender stream = sender.sender(receiver.peer(), options).or_throw();
   for (int i = 0; i < 5000; ++i)
     stream.send(std::to_string(i), kForever, i % 7 != 0 ? More::yes : More::no).or_throw();
   stream.settle(kWait).or_throw();
@@ -245,9 +268,9 @@ TEST_F(NodeTest, ListsNodesServicesAndCounters) {
                 counters, [](const auto& of) { return of.shard != ShardCounts::kConductor; }),
             2);
   EXPECT_EQ(watcher.hub_connections().or_throw().size(), 2u);
-  watcher.sender_to_service("robot/drive").or_throw().send("go").or_throw();
+  watcher.sender("robot/drive").or_throw().send("go").or_throw();
   EXPECT_EQ(commands.receive(kWait)->text(), "go");
-  EXPECT_TRUE(watcher.sender_to_service("robot/odom").is(Status::not_found));
+  EXPECT_TRUE(watcher.sender("robot/odom").is(Status::not_found));
 }
 
 TEST_F(NodeTest, ManyThreadsUseOneNode) {
@@ -306,7 +329,7 @@ TEST_F(NodeTest, WhoSendsTooMuchToAServiceIsTold) {
   const Node viewer = join();
   SendOptions synchronized;
   synchronized.window = 2;
-  const Sender drive = viewer.sender_to_service("robot/drive", synchronized).or_throw();
+  const Sender drive = viewer.sender("robot/drive", synchronized).or_throw();
   drive.send("ten bytes.", kWait).or_throw();
   drive.send("and eleven.", kWait).or_throw();
   EXPECT_TRUE(drive.settle(kWait).is(Status::not_delivered));

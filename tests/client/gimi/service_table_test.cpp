@@ -217,7 +217,7 @@ TEST_F(Services, EveryNodeSendsToWhoAcceptsAndIsAnswered) {
   const Node named = join("operator");
   const Node nameless = join();
   for (const Node* node : {&named, &nameless}) {
-    const Sender drive = node->sender_to_service("robot/drive", synchronized(3)).or_throw();
+    const Sender drive = node->sender("robot/drive", synchronized(3)).or_throw();
     EXPECT_EQ(drive.service(), "robot/drive");
     for (int i = 0; i < 100; ++i) drive.send(std::to_string(i)).or_throw();
     drive.settle(kWait).or_throw();
@@ -238,8 +238,8 @@ TEST_F(Services, WhatIsSentToOneAndToItsNodeAreTwoStreams) {
   const Node viewer = join();
   SendOptions options = synchronized(1);
   options.key = {5, 0};
-  const Sender drive = viewer.sender_to_service("robot/drive", options).or_throw();
-  const Sender direct = viewer.sender("robot", options).or_throw();
+  const Sender drive = viewer.sender("robot/drive", options).or_throw();
+  const Sender direct = viewer.sender(robot.peer(), options).or_throw();
   for (int i = 0; i < 50; ++i) {
     drive.send("service").or_throw();
     direct.send("node").or_throw();
@@ -253,13 +253,13 @@ TEST_F(Services, OnlyWhatAcceptsCanBeSentTo) {
   const Node robot = join("robot");
   const Publisher odometry = robot.advertise("odom").or_throw();
   const Node viewer = join();
-  EXPECT_TRUE(viewer.sender_to_service("robot/odom").is(Status::not_found));
-  EXPECT_TRUE(viewer.sender_to_service("robot/drive").is(Status::not_found)) << "not there yet";
-  EXPECT_TRUE(viewer.sender_to_service("robot/*").is(Status::not_found))
+  EXPECT_TRUE(viewer.sender("robot/odom").is(Status::not_found));
+  EXPECT_TRUE(viewer.sender("robot/drive").is(Status::not_found)) << "not there yet";
+  EXPECT_TRUE(viewer.sender("robot/*").is(Status::not_found))
       << "one service, not a pattern";
-  EXPECT_TRUE(viewer.sender_to_service("a//b").is(Status::bad_name));
+  EXPECT_TRUE(viewer.sender("a//b").is(Status::bad_name));
   EXPECT_TRUE(
-      viewer.sender_to_service("robot/odom", synchronized(kWindowMax + 1)).is(Status::not_found));
+      viewer.sender("robot/odom", synchronized(kWindowMax + 1)).is(Status::not_found));
 }
 
 TEST_F(Services, ASenderFollowsAServiceThatGoesAndComesBack) {
@@ -269,7 +269,7 @@ TEST_F(Services, ASenderFollowsAServiceThatGoesAndComesBack) {
     const Node robot = join("robot");
     // Each life has other types of messages, so each has another group.
     const Queue commands = robot.accept("drive", accepting({life, 0})).or_throw();
-    if (!drive) drive = viewer.sender_to_service("robot/drive", synchronized(1)).or_throw();
+    if (!drive) drive = viewer.sender("robot/drive", synchronized(1)).or_throw();
     EXPECT_TRUE(eventually([&] { return drive->send(std::to_string(life), kWait).ok(); }));
     drive->settle(kWait).or_throw();
     EXPECT_EQ(commands.receive(kWait)->text(), std::to_string(life));
@@ -284,14 +284,14 @@ TEST_F(Services, ASenderFollowsAServiceToItsNodesNewName) {
   const Node viewer = join();
   const Node robot = join("robot");
   const Queue commands = robot.accept("drive", accepting({5, 0})).or_throw();
-  const Sender drive = viewer.sender_to_service("robot/drive", synchronized(1)).or_throw();
+  const Sender drive = viewer.sender("robot/drive", synchronized(1)).or_throw();
   drive.send("1").or_throw();
   drive.settle(kWait).or_throw();
   robot.take_name("forklift", kWait).or_throw();
   EXPECT_TRUE(eventually([&] { return drive.send("?", kWait).is(Status::not_found); }))
       << "another service now";
-  EXPECT_TRUE(eventually([&] { return viewer.sender_to_service("forklift/drive").ok(); }));
-  viewer.sender_to_service("forklift/drive").or_throw().send("2").or_throw();
+  EXPECT_TRUE(eventually([&] { return viewer.sender("forklift/drive").ok(); }));
+  viewer.sender("forklift/drive").or_throw().send("2").or_throw();
   robot.take_name("robot", kWait).or_throw();
   EXPECT_TRUE(eventually([&] { return drive.send("3", kWait).ok(); }));
   std::string last;
@@ -303,7 +303,7 @@ TEST_F(Services, ReadingAndSendingToOneServiceDoNotDisturbEachOther) {
   const Node robot = join("robot");
   std::optional<Subscription> subscription = viewer.subscribe("robot/drive").or_throw();
   const Queue commands = robot.accept("drive", accepting({5, 0})).or_throw();
-  const Sender drive = viewer.sender_to_service("robot/drive", synchronized(1)).or_throw();
+  const Sender drive = viewer.sender("robot/drive", synchronized(1)).or_throw();
   subscription.reset();
   drive.send("1").or_throw();
   drive.settle(kWait).or_throw();

@@ -38,7 +38,7 @@ class KeptServices : public testing::Test {
     return sender_.services(service(number), kWait).or_throw().at(0).subscribers == 1;
   }
   [[nodiscard]] Sender to(std::size_t number) const {
-    return sender_.sender_to_service(service(number), {}, kWait).or_throw();
+    return sender_.sender(service(number), {}, kWait).or_throw();
   }
 
   test::HubProcess hub_;

@@ -61,7 +61,7 @@ class StreamTableTest : public Conversation {
     options.key = {9, 9};  // the service's own counts
     std::optional<Sender> made;
     std::thread asking(
-        [&] { made.emplace(node_->sender_to_service(kService, options).or_throw()); });
+        [&] { made.emplace(node_->sender(kService, options).or_throw()); });
     serve();
     asking.join();
     return *made;
@@ -224,24 +224,14 @@ TEST_F(StreamTableTest, AReportThatTheGroupIsGoneFreesEverything) {
 
 TEST_F(StreamTableTest, OneStreamForAllWhoSendToAService) {
   const Sender first = to_service(5);
-  std::optional<Sender> second;
-  std::thread asking([&] { second.emplace(node_->sender_to_service(kService).or_throw()); });
-  std::uint16_t number = 0;
-  ASSERT_TRUE(hub_.next_request<ns::Services>(number));
-  ns::ServicesAnswer listed;
-  listed.services.resize(1);
-  listed.services[0].group = GroupId{kGroup};
-  listed.services[0].name = kService;
-  listed.services[0].direction = ns::Direction::accepts;
-  hub_.send_control(proto::Kind::ns, proto::encode_answer(listed, number));
-  asking.join();
-  second->send("x").or_throw();
+  const Sender second = node_->sender(kService, {.window = 5}).or_throw();  // asks nobody
+  second.send("x").or_throw();
   EXPECT_EQ(first.counts().sent, 1u);
 }
 
 TEST_F(StreamTableTest, AServiceThatGivesDataTakesNone) {
   std::thread asking([&] {
-    const auto refused = node_->sender_to_service(kService);
+    const auto refused = node_->sender(kService);
     EXPECT_TRUE(refused.is(Status::not_found));
     EXPECT_NE(refused.failure().sentence.find("subscribe"), std::string::npos);
   });

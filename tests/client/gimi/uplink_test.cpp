@@ -47,15 +47,14 @@ std::string wrong_call(const Node& node, const Publisher& publisher,
   if (!is_forked(node.subscribe("robot/other"))) return "subscribe";
   if (!is_forked(node.watch("**"))) return "watch";
   if (!is_forked(node.sender(Peer{1}))) return "sender";
-  if (!is_forked(node.sender_to_service("robot/odom"))) return "sender_to_service";
+  if (!is_forked(node.sender("robot/odom"))) return "sender to a service";
   if (!is_forked(node.send(Peer{1}, "x"))) return "send";
   if (!is_forked(node.find("robot"))) return "find";
   if (!is_forked(node.nodes())) return "nodes";
   if (!is_forked(node.take_name("x"))) return "take_name";
   if (!is_forked(node.flush())) return "flush";
   if (!is_forked(node.drain())) return "drain";
-  if (!is_forked(node.sender("robot", {}, kForever))) return "sender by name";
-  if (!is_forked(node.send("robot", "x"))) return "send by name";
+  if (!is_forked(node.send("robot/odom", "x"))) return "send to a service";
   if (!is_forked(node.services())) return "services";
   if (!is_forked(node.name_of(Peer{1}))) return "name_of";
   if (!is_forked(node.give_name_back())) return "give_name_back";
