@@ -12,7 +12,7 @@ int main() try {
   const auto odometry = robot.advertise("odom").or_throw();  // its full name is robot/odom
   for (int step = 0;; ++step) {
     const auto sent = odometry.publish("x " + std::to_string(0.1 * step) + " y 0");
-    // While the hub is away publish() waits for a second and says so. The next message is newer.
+    // While the hub is away the message is dropped, and publish() says so. The next one is newer.
     if (!sent) std::cerr << "publisher: " << sent.failure().sentence << '\n';
     if (robot.state().ended) return 1;  // no connection will come any more
     std::this_thread::sleep_for(std::chrono::milliseconds(100));

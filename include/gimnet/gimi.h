@@ -89,10 +89,10 @@ GIMNET_API gimi_status gimi_advertise(gimi_handle node, const char* name,
                                       const gimi_publish_options* options, gimi_handle* publisher);
 /** Sends 0 bytes to 1 GiB to all subscribers; slow ones are not waited for. Without subscribers
  * nothing leaves the process, but of a retained service. `more`, not 0: others follow at once, and
- * are written together with the next one without it. Waits while the connection is broken, where
- * that is resumed, while the own send queue is full, and while another thread publishes.
- * GIMI_TIMEOUT (not sent), GIMI_NOT_RETAINED (sent, but too large to be kept), GIMI_REFUSED (the
- * hub did not take the service again), GIMI_NOT_CONNECTED, GIMI_TOO_LARGE. */
+ * are written together with the next one without it. Waits while the own send queue is full and
+ * while another thread publishes. While the hub is away the message is dropped at once, also one to
+ * be retained: GIMI_NOT_CONNECTED. GIMI_TIMEOUT (not sent), GIMI_NOT_RETAINED (sent, but too large
+ * to be kept), GIMI_REFUSED (the hub did not take the service again), GIMI_TOO_LARGE. */
 GIMNET_API gimi_status gimi_publish(gimi_handle publisher, const void* data, size_t size,
                                     int32_t timeout_ms, int32_t more);
 /** gimi_publish() of `count` messages, written together. Stores in *published how many were sent;
@@ -112,6 +112,8 @@ GIMNET_API gimi_status gimi_wait_for_subscribers(gimi_handle publisher, size_t c
                                                  int32_t timeout_ms);
 /** The number of messages that gimi_publish() sent. */
 GIMNET_API uint64_t gimi_published(gimi_handle publisher);
+/** The number of messages that gimi_publish() dropped, since the hub was away. */
+GIMNET_API uint64_t gimi_unsent(gimi_handle publisher);
 /** GIMI_OK until the hub says that it does not keep the last message, a moment after
  * gimi_publish(); GIMI_NOT_RETAINED (why). */
 GIMNET_API gimi_status gimi_retained(gimi_handle publisher);

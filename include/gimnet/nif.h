@@ -262,7 +262,10 @@ enum {
   NIF_FLAG_KEYED = 0x02,  /**< nif_outgoing.key is part of the message. */
   /** More messages follow at once: do not write yet. They are written with the next message
    * without this flag, at 64 KiB, by nif_flush(), and at the latest with the next keep-alive. */
-  NIF_FLAG_MORE = 0x04
+  NIF_FLAG_MORE = 0x04,
+  /** Drop it while there is no connection to the hub, also with resume: NIF_NOT_CONNECTED at once.
+   */
+  NIF_FLAG_NOT_WHILE_AWAY = 0x08
 };
 
 /** A piece of memory. */

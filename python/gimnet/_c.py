@@ -210,6 +210,7 @@ _OTHER_FUNCTIONS = {
     "gimi_id": (c_uint32, [_HANDLE]),
     "gimi_subscribers": (c_size_t, [_HANDLE]),
     "gimi_message_release": (None, [POINTER(gimi_message)]),
+    "gimi_unsent": (c_uint64, [_HANDLE]),
     "gimi_batch_release": (None, [POINTER(gimi_batch)]),
     "gimi_list_release": (None, [POINTER(gimi_list)]),
     "gimi_reply_release": (None, [POINTER(gimi_reply)]),

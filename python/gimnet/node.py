@@ -78,8 +78,8 @@ class Publisher(Blocking):
         self._node = node
 
     def publish(self, value: Any, timeout: float = 1.0) -> bool:
-        """Sends a dict as a Bitestream, a str as UTF-8, or any buffer. False: not sent, since the hub is
-        away or did not take it in time. Raises only for mistakes of the program."""
+        """Sends a dict as a Bitestream, a str as UTF-8, or any buffer. False: dropped, at once while the hub
+        is away, or because it did not take it in time. Raises only for mistakes of the program."""
         data, size, keeps = messages.payload(value)
         status = in_pieces(timeout, lambda ms: _c.lib.gimi_publish(self._handle, data, size, ms, 0))
         del keeps
@@ -88,6 +88,11 @@ class Publisher(Blocking):
         if status != _c.GIMI_NOT_RETAINED:  # it was sent
             self.check(status)
         return True
+
+    @property
+    def unsent(self) -> int:
+        """Messages that were dropped, since the hub was away."""
+        return int(_c.lib.gimi_unsent(self._handle))
 
     @property
     def subscribers(self) -> int:

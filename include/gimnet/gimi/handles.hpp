@@ -107,9 +107,10 @@ struct SendCounts {
 
 /// A stream of messages with one key, to one node or to whoever accepts one service. Several
 /// Senders of one (peer, key), or of one service, of a node are one stream: they share sequence,
-/// window and counts. The options of the first hold as long as the node lives; others are refused. One to a service follows it: while nobody has
-/// the service, send() answers not_found; when it is back, under whichever node and group, messages
-/// go there. Messages not acknowledged at its former place count as lost.
+/// window and counts. The options of the first hold as long as the node lives; others are refused.
+/// One to a service follows it: while nobody has the service, send() answers not_found; when it is
+/// back, under whichever node and group, messages go there. Messages not acknowledged at its former
+/// place count as lost.
 class Sender {
  public:
   /// Sends 0 bytes to 1 GiB. Ok: it is on its way; of a synchronized stream, settle() and counts()
@@ -151,8 +152,8 @@ class Sender {
   detail::SharedHandle handle_;
 };
 
-/// The wait of Publisher::publish() if nobody says otherwise: a loop that steers something must
-/// not stand still for as long as its hub is away, and what it would have said is old by then.
+/// The wait of Publisher::publish() for a hub that takes too little, if nobody says otherwise: a
+/// loop that steers something must not stand still for longer, and its message is old by then.
 inline constexpr Timeout kPublishTimeout{1000};
 
 /// The answer of Publisher::publish(), which may be ignored: what could not be sent is old by the
@@ -194,11 +195,11 @@ class Loan {
 class Publisher {
  public:
   /// Sends 0 bytes to 1 GiB to all subscribers; slow ones are not waited for. Without subscribers
-  /// nothing leaves the process, but of a retained service. Waits while the connection is broken,
-  /// where that is resumed, while the own send queue is full, and while another thread publishes.
-  /// Errors: timeout (not sent; subscribers may count it as missed), not_retained (sent, but too
-  /// large to be kept), refused (the hub did not take the service again), not_connected, too_large,
-  /// closed.
+  /// nothing leaves the process, but of a retained service. Waits while the own send queue is full
+  /// and while another thread publishes. While the hub is away the message is dropped at once, also
+  /// one to be retained: not_connected. Other errors: timeout (not sent; subscribers may count it
+  /// as missed), not_retained (sent, but too large to be kept), refused (the hub did not take the
+  /// service again), too_large, closed.
   Published publish(BytesView data, Timeout timeout = kPublishTimeout, More more = More::no) const {
     return detail::outcome_of(gimi_publish(handle_->value(), data.data(), data.size(),
                                            milliseconds_of(timeout), more == More::yes ? 1 : 0));
@@ -230,6 +231,8 @@ class Publisher {
   [[nodiscard]] std::string name() const { return detail::service_name(*handle_); }
   /// Messages that publish() sent.
   [[nodiscard]] std::uint64_t published() const { return gimi_published(handle_->value()); }
+  /// Messages that publish() dropped, since the hub was away.
+  [[nodiscard]] std::uint64_t unsent() const { return gimi_unsent(handle_->value()); }
   /// Does the hub keep the last message for later subscribers? Ok until it says no, a moment after
   /// publish(). Errors: not_retained (why), closed.
   [[nodiscard]] Outcome<void> retained() const {

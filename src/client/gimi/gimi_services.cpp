@@ -122,6 +122,15 @@ uint64_t gimi_published(gimi_handle publisher) {
 }
 
 gimi_status gimi_retained(gimi_handle publisher) {
+uint64_t gimi_unsent(gimi_handle publisher) {
+  uint64_t count = 0;
+  static_cast<void>(with<PublisherObject>(publisher, [&](PublisherObject& found) -> gimi_status {
+    count = found.service.unsent();
+    return GIMI_OK;
+  }));
+  return count;
+}
+
   return with<PublisherObject>(
       publisher, [](PublisherObject& found) { return answer(found.service.retained()); });
 }

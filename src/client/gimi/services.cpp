@@ -9,7 +9,14 @@ namespace gimnet::gimi {
 
 Outcome<void> PublishedService::publish(BytesView data, Timeout timeout, More more) {
   const std::int64_t deadline = deadline_after(timeout);
-  Envelope envelope{0, NIF_GROUP, NIF_POLICY_DEFAULT, options_.lane, options_.key, 0, 0};
+  // Not while the hub is away: when it is back there are newer ones.
+  Envelope envelope{0,
+                    NIF_GROUP,
+                    NIF_POLICY_DEFAULT,
+                    options_.lane,
+                    options_.key,
+                    0,
+                    NIF_FLAG_NOT_WHILE_AWAY};
   if (options_.delivery == Delivery::latest) envelope.policy = NIF_LATEST;
   if (more == More::yes) envelope.flags |= NIF_FLAG_MORE;
   std::uint32_t sequence = 0;
@@ -50,6 +57,7 @@ Outcome<void> PublishedService::publish(BytesView data, Timeout timeout, More mo
   sending_ = false;
   changed_.notify_all();
   if (sent) ++published_;
+  if (status == NIF_NOT_CONNECTED) ++unsent_;
   if (status == NIF_OK) return {};
   if (sent) not_retained_ = failure;
   return failure;
@@ -99,6 +107,11 @@ Outcome<void> PublishedService::wait_for_subscribers(std::size_t count, Timeout 
 std::uint64_t PublishedService::published() {
   const MutexLock lock(mutex_);
   return published_;
+}
+
+std::uint64_t PublishedService::unsent() {
+  const MutexLock lock(mutex_);
+  return unsent_;
 }
 
 Outcome<void> PublishedService::standing() {

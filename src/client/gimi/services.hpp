@@ -42,6 +42,8 @@ class PublishedService {
   [[nodiscard]] Outcome<void> wait_for_subscribers(std::size_t count, Timeout timeout)
       GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::uint64_t published() GIMNET_EXCLUDES(mutex_);
+  /// Dropped, since the hub was away.
+  [[nodiscard]] std::uint64_t unsent() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] Outcome<void> standing() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] Outcome<void> retained() GIMNET_EXCLUDES(mutex_);
 
@@ -78,6 +80,7 @@ class PublishedService {
   bool subscribers_known_ GIMNET_GUARDED_BY(mutex_) = true;
   std::uint32_t sequence_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::uint64_t published_ GIMNET_GUARDED_BY(mutex_) = 0;
+  std::uint64_t unsent_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::optional<Failure> not_retained_ GIMNET_GUARDED_BY(mutex_);  ///< of the last message
   bool sending_ GIMNET_GUARDED_BY(mutex_) = false;
   Ending end_ GIMNET_GUARDED_BY(mutex_);

@@ -188,8 +188,8 @@ nif_status Outbound::wait_until_it_may_go(const Outgoing& message, std::size_t f
                                           const SendProgress* own, Deadline deadline) {
   std::int64_t probe_at = 0;
   for (;;) {
-    if (state_ == State::ended || (state_ == State::away && !queue_.resume()))
-      return not_connected();
+    const bool waits = queue_.resume() && (own != nullptr || !message.not_while_away());
+    if (state_ == State::ended || (state_ == State::away && !waits)) return not_connected();
     if (own != nullptr) {
       if (const nif_status status = check_progress(*own); status != NIF_OK) return status;
     }

@@ -13,7 +13,8 @@
 namespace gimnet::nif {
 namespace {
 
-constexpr std::uint8_t kKnownFlags = NIF_FLAG_REPORT | NIF_FLAG_KEYED | NIF_FLAG_MORE;
+constexpr std::uint8_t kKnownFlags =
+    NIF_FLAG_REPORT | NIF_FLAG_KEYED | NIF_FLAG_MORE | NIF_FLAG_NOT_WHILE_AWAY;
 /// Less than a TRACE can have (proto::kTraceSlotsMax).
 constexpr std::uint8_t kOwnTraceSlotsMax = 8;
 static_assert(kOwnTraceSlotsMax <= proto::kTraceSlotsMax);
@@ -102,6 +103,7 @@ std::optional<Failure> Outgoing::read(const nif_outgoing& given, HubClock* clock
   if ((message.flags & NIF_FLAG_REPORT) != 0) parts_.header.flags |= proto::kFlagReport;
   if ((message.flags & NIF_FLAG_KEYED) != 0) parts_.key = message.key;
   more_ = (message.flags & NIF_FLAG_MORE) != 0;
+  not_while_away_ = (message.flags & NIF_FLAG_NOT_WHILE_AWAY) != 0;
   if (auto failure = read_address(message)) return failure;
   if (auto failure = read_payload(message)) return failure;
   if (message.age_ms_max != 0 || message.trace_slots != 0) read_extensions(message, clock);

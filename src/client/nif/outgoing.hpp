@@ -35,6 +35,8 @@ class Outgoing {
   /// LATEST, and small enough to be replaced whole in the send queue.
   [[nodiscard]] bool replaceable() const;
   [[nodiscard]] bool more() const { return more_; }
+  /// It does not wait for a connection.
+  [[nodiscard]] bool not_while_away() const { return not_while_away_; }
   [[nodiscard]] bool is_group() const { return parts_.header.kind == proto::Kind::group; }
   /// It is for that destination now.
   void redirect(std::uint32_t dst);
@@ -74,6 +76,7 @@ class Outgoing {
   std::uint32_t size_ = 0;
   std::uint64_t stream_ = 0;
   bool more_ = false;
+  bool not_while_away_ = false;
   bool patient_ = true;
   std::vector<std::byte> rest_;  ///< of a copy
   nif_bytes rest_part_{};

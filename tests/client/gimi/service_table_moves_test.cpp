@@ -231,6 +231,9 @@ TEST_P(MovedOwnServices, ComeBackAfterAHubThatRefusedThem) {
 TEST_P(MovedOwnServices, KeepNobodyWaitingForLongerThanItWants) {
   const Publisher odometry = advertise("odom", kFirst);
   hub_.close();
+  while (node_->state().connected) std::this_thread::yield();
+  EXPECT_TRUE(odometry.publish("x", kForever).is(Status::not_connected)) << "the hub is away";
+  EXPECT_EQ(odometry.unsent(), 1u);
   hub_ = fake_.admit(nif::test::make_welcome());
   std::uint16_t declared = 0;
   ASSERT_TRUE(hub_.next_request<ns::Advertise>(

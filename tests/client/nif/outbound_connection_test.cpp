@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cstddef>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -13,11 +14,11 @@ namespace gimnet::nif::test {
 namespace {
 
 /// A message that stays in the queue.
-nif_status hold(Line& line, const char* payload) {
+nif_status hold(Line& line, const char* payload, unsigned flags = 0, std::int32_t timeout_ms = 0) {
   nif_outgoing message = NIF_OUTGOING_INIT;
   message.to = kPeerId;
-  message.flags = NIF_FLAG_MORE;
-  return line.send(message, payload, 0);
+  message.flags = static_cast<std::uint8_t>(NIF_FLAG_MORE | flags);
+  return line.send(message, payload, timeout_ms);
 }
 
 TEST(OutboundConnection, WithoutResumeWhatWaitsAtABreakIsLostAndDrainTellsOnce) {
@@ -48,10 +49,12 @@ TEST(OutboundConnection, WhileItIsAwayCallsThatFailSayForHowLong) {
   line.outbound.detach(true);
   EXPECT_EQ(hold(line, "in time"), NIF_TIMEOUT);
   EXPECT_THAT(error_text(), testing::StartsWith("the hub has been away for 0."));
+  EXPECT_EQ(hold(line, "at once", NIF_FLAG_NOT_WHILE_AWAY, NIF_FOREVER), NIF_NOT_CONNECTED);
+  EXPECT_THAT(error_text(), testing::StartsWith("the hub has been away for 0."));
   EXPECT_EQ(line.outbound.flush(), NIF_NOT_CONNECTED);
   EXPECT_THAT(error_text(), testing::StartsWith("the hub has been away for 0."));
   line.attach(Line::session_of(true));
-  EXPECT_EQ(hold(line, "back"), NIF_OK);
+  EXPECT_EQ(hold(line, "back", NIF_FLAG_NOT_WHILE_AWAY), NIF_OK);
 }
 
 TEST(OutboundConnection, GoodbyeIsTheLastWord) {
