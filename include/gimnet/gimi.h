@@ -185,7 +185,7 @@ GIMNET_API gimi_status gimi_drain(gimi_handle node, int32_t timeout_ms);
 GIMNET_API gimi_status gimi_queue(gimi_handle node, gimi_key key, const gimi_queue_options* options,
                                   gimi_handle* queue);
 /** Takes the oldest message of a subscription or queue; of a node, the one that waited longest in
- * any. GIMI_TIMEOUT, GIMI_CLOSED. Release it. */
+ * any. GIMI_TIMEOUT, GIMI_SILENCE, GIMI_CLOSED. Release it. */
 GIMNET_API gimi_status gimi_receive(gimi_handle source, int32_t timeout_ms, gimi_message* message);
 /** Takes the newest message of a subscription or queue and drops the others, which counts as taking
  * them. GIMI_TIMEOUT: there is none. */

@@ -36,16 +36,17 @@ typedef struct gimi_node_options {
    * NULL or "": the environment's GIMNET_PROXY, if it is set, for a hub that is named by tcp://. */
   const char* proxy;
   const gimi_credentials* credentials;
-  int32_t timeout_ms;     /**< For joining; 0: 5,000. */
-  uint8_t wait_for_hub;   /**< Not 0: dial again until timeout_ms if there is no hub yet. */
-  uint8_t no_reconnect;   /**< Not 0: a break is the end. With resume 2 only if the hub cannot
-                             resume the session. */
-  uint8_t resume;         /**< 0: on for nodes with a name; 1: off; 2: on. On: a break loses
-                             nothing. */
-  uint8_t no_token_file;  /**< Not 0: the session token is kept in memory only. */
-  uint8_t shard_plus_one; /**< Shard of the hub wished for, plus 1. */
-  uint8_t administrator;  /**< Not 0: join as one who may change the hub. */
-  uint8_t reserved[2];
+  int32_t timeout_ms;      /**< For joining; 0: 5,000. */
+  uint8_t wait_for_hub;    /**< Not 0: dial again until timeout_ms if there is no hub yet. */
+  uint8_t no_reconnect;    /**< Not 0: a break is the end. With resume 2 only if the hub cannot
+                              resume the session. */
+  uint8_t resume;          /**< 0: on for nodes with a name; 1: off; 2: on. On: a break loses
+                              nothing. */
+  uint8_t no_token_file;   /**< Not 0: the session token is kept in memory only. */
+  uint8_t shard_plus_one;  /**< Shard of the hub wished for, plus 1. */
+  uint8_t administrator;   /**< Not 0: join as one who may change the hub. */
+  uint8_t number_if_taken; /**< Not 0: if the name is taken, join as NAME-2, NAME-3 ... NAME-99. */
+  uint8_t reserved[1];
   uint32_t socket_receive_bytes; /**< SO_RCVBUF; 0: the system's. */
   uint32_t last_message_bytes;   /**< Of the largest last message of an own service with `retain`
                                     that is kept for a hub that was started again; 0: 16 MiB. */
@@ -74,7 +75,9 @@ typedef struct gimi_subscribe_options {
   int32_t timeout_ms;  /**< For the hub's answer; 0: 5,000. */
   uint8_t newest_only; /**< Not 0: only the newest message waits, in the queue and at the hub; queue
                           is 0 or 1. */
-  uint8_t reserved[7];
+  uint8_t reserved[3];
+  int32_t silence_ms; /**< Not 0: while nothing comes, receive functions answer GIMI_SILENCE once in
+                         that time. */
   /** For experts: untaken messages, 1..1,024. 0: 2 with newest_only, else any number, and of
    * GIMI_SYNC as many as the service allows, which is the most. */
   uint32_t window;
@@ -108,7 +111,7 @@ typedef struct gimi_publish_options {
   uint8_t reserved[2];
   const char* metadata; /**< For people and tools, at most 4,096 bytes of UTF-8. */
   int32_t timeout_ms;   /**< For the hub's answer; 0: 5,000. */
-  int32_t reserved_too;
+  uint32_t age_ms_max;  /**< Not 0: dropped on the way when older, by the clocks of the hubs. */
 } gimi_publish_options;
 
 typedef struct gimi_accept_options {

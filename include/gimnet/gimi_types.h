@@ -63,6 +63,7 @@ enum {
   GIMI_BUSY = 22,         /**< Too many requests wait for the program that was asked. */
   GIMI_FAILED = 23,       /**< The program that was asked says so, with a code of its own. */
   GIMI_GONE = 24,         /**< The program that was asked has ended, or let the request go. */
+  GIMI_SILENCE = 25,      /**< Nothing came for gimi_subscribe_options.silence_ms. */
   /* Of rights and trust. No call answers these yet. */
   GIMI_NOT_TRUSTED = 32,
   GIMI_NO_RIGHT = 33,

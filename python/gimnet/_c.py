@@ -34,6 +34,7 @@ GIMI_NOT_RETAINED = 21
 GIMI_BUSY = 22
 GIMI_FAILED = 23
 GIMI_GONE = 24
+GIMI_SILENCE = 25
 GIMI_NOT_TRUSTED = 32
 GIMI_NO_RIGHT = 33
 GIMI_EXPIRED = 34
@@ -69,15 +70,15 @@ class gimi_node_options(ctypes.Structure):
     _fields_ = [("struct_size", c_size_t), ("name", c_char_p), ("hub", c_char_p), ("description", c_char_p),
                 ("proxy", c_char_p), ("credentials", c_void_p), ("timeout_ms", c_int32), ("wait_for_hub", c_uint8),
                 ("no_reconnect", c_uint8), ("resume", c_uint8), ("no_token_file", c_uint8), ("shard_plus_one", c_uint8),
-                ("administrator", c_uint8), ("reserved", c_uint8 * 2), ("socket_receive_bytes", c_uint32),
-                ("last_message_bytes", c_uint32), ("message_bytes_max", c_size_t), ("receive_bytes", c_size_t),
-                ("queue_messages", c_size_t)]
+                ("administrator", c_uint8), ("number_if_taken", c_uint8), ("reserved", c_uint8 * 1),
+                ("socket_receive_bytes", c_uint32), ("last_message_bytes", c_uint32), ("message_bytes_max", c_size_t),
+                ("receive_bytes", c_size_t), ("queue_messages", c_size_t)]
 
 
 class gimi_subscribe_options(ctypes.Structure):
     _fields_ = [("struct_size", c_size_t), ("rate_hz", c_double), ("queue", c_size_t), ("at_full", c_int32),
-                ("timeout_ms", c_int32), ("newest_only", c_uint8), ("reserved", c_uint8 * 7), ("window", c_uint32),
-                ("depth", c_uint32)]
+                ("timeout_ms", c_int32), ("newest_only", c_uint8), ("reserved", c_uint8 * 3), ("silence_ms", c_int32),
+                ("window", c_uint32), ("depth", c_uint32)]
 
 
 class gimi_send_options(ctypes.Structure):
@@ -89,7 +90,7 @@ class gimi_send_options(ctypes.Structure):
 class gimi_publish_options(ctypes.Structure):
     _fields_ = [("struct_size", c_size_t), ("key", gimi_key), ("lane", c_int32), ("delivery", c_int32),
                 ("window", c_uint32), ("retain", c_uint8), ("no_timestamp", c_uint8), ("reserved", c_uint8 * 2),
-                ("metadata", c_char_p), ("timeout_ms", c_int32), ("reserved_too", c_int32)]
+                ("metadata", c_char_p), ("timeout_ms", c_int32), ("age_ms_max", c_uint32)]
 
 
 class gimi_accept_options(ctypes.Structure):
@@ -209,8 +210,8 @@ _STATUS_FUNCTIONS = {
 _OTHER_FUNCTIONS = {
     "gimi_id": (c_uint32, [_HANDLE]),
     "gimi_subscribers": (c_size_t, [_HANDLE]),
-    "gimi_message_release": (None, [POINTER(gimi_message)]),
     "gimi_unsent": (c_uint64, [_HANDLE]),
+    "gimi_message_release": (None, [POINTER(gimi_message)]),
     "gimi_batch_release": (None, [POINTER(gimi_batch)]),
     "gimi_list_release": (None, [POINTER(gimi_list)]),
     "gimi_reply_release": (None, [POINTER(gimi_reply)]),

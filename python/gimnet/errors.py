@@ -113,6 +113,10 @@ class Gone(GimnetError):
     """The program that was asked has ended, or let the request go."""
 
 
+class Silence(GimnetError):
+    """Nothing came for as long as `silence` of subscribe() says."""
+
+
 class NotTrusted(GimnetError):
     """The hub, or this node, could not prove who it is."""
 
@@ -132,7 +136,7 @@ BY_STATUS: Dict[int, Type[GimnetError]] = {
     _c.GIMI_TAKEN: Taken, _c.GIMI_DENIED: Denied, _c.GIMI_LIMIT: Limit, _c.GIMI_TOO_LARGE: TooLarge,
     _c.GIMI_NOT_DELIVERED: NotDelivered, _c.GIMI_WINDOW_FULL: WindowFull, _c.GIMI_PROTOCOL: Protocol,
     _c.GIMI_SYSTEM: System, _c.GIMI_FORKED: Forked, _c.GIMI_NOT_RETAINED: NotRetained,
-    _c.GIMI_BUSY: Busy, _c.GIMI_FAILED: Failed, _c.GIMI_GONE: Gone,
+    _c.GIMI_BUSY: Busy, _c.GIMI_FAILED: Failed, _c.GIMI_GONE: Gone, _c.GIMI_SILENCE: Silence,
     _c.GIMI_NOT_TRUSTED: NotTrusted, _c.GIMI_NO_RIGHT: NoRight, _c.GIMI_EXPIRED: Expired,
 }
 for _status, _class in BY_STATUS.items():

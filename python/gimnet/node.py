@@ -156,22 +156,27 @@ class Node(Waitable):
         return self.state().name
 
     def advertise(self, name: str, *, delivery: str = "stream", window: int = 0, retain: bool = False,
-                  key: Tuple[int, int] = (0, 0), metadata: str = "", timeout: float = 5.0) -> Publisher:
+                  key: Tuple[int, int] = (0, 0), metadata: str = "", age_max: float = 0.0,
+                  timeout: float = 5.0) -> Publisher:
         """Provides the service `own name/name`. `delivery`: stream, latest, or sync, at most `window`
-        messages that a subscriber has not taken. BadName, Taken, Denied (a node without a name)."""
+        messages that a subscriber has not taken. `age_max`: dropped on the way when older. BadName, Taken,
+        Denied (a node without a name)."""
         if delivery not in messages.DELIVERIES:
             raise errors.BadArgument(f"there is no delivery {delivery!r}: use {', '.join(messages.DELIVERIES)}")
         options = sized(_c.gimi_publish_options, key=_c.gimi_key(*key), delivery=messages.DELIVERIES[delivery], window=window,
-                         retain=retain, metadata=to_text(metadata), timeout_ms=to_ms(timeout))
+                         retain=retain, metadata=to_text(metadata), timeout_ms=to_ms(timeout),
+                         age_ms_max=to_ms(age_max) if age_max else 0)
         return Publisher(self, self._opened(_c.lib.gimi_advertise, to_text(name), options))
 
     def subscribe(self, full_name: str, *, rate_hz: float = 0.0, newest_only: bool = False, queue: int = 0,
-                  window: int = 0, depth: int = 0, timeout: float = 5.0) -> Source:
+                  silence: float = 0.0, window: int = 0, depth: int = 0, timeout: float = 5.0) -> Source:
         """Subscribes to a service, which need not exist yet; each call has a queue of its own. `rate_hz`: the
         newest at each due time. `newest_only`: only the newest waits. `queue`: messages that may wait; the
-        oldest is overwritten. `window`, `depth`: for experts. BadName, NotFound (it takes commands)."""
+        oldest is overwritten. `silence`: receive() raises Silence once in that time while nothing comes.
+        `window`, `depth`: for experts. BadName, NotFound (it takes commands)."""
         options = sized(_c.gimi_subscribe_options, rate_hz=rate_hz, queue=queue, timeout_ms=to_ms(timeout),
-                         newest_only=newest_only, window=window, depth=depth)
+                         newest_only=newest_only, silence_ms=to_ms(silence) if silence else 0, window=window,
+                         depth=depth)
         return Source(self, self._opened(_c.lib.gimi_subscribe, to_text(full_name), options))
 
     def accept(self, name: str, *, queue: int = 0, key: Tuple[int, int] = (0, 0), metadata: str = "",
@@ -262,11 +267,12 @@ class Node(Waitable):
         return messages.taken(raw)
 
 
-def connect(name: str = "", *, hub: str = "", description: str = "", timeout: float = 5.0, wait_for_hub: bool = False) -> Node:
+def connect(name: str = "", *, hub: str = "", description: str = "", timeout: float = 5.0, wait_for_hub: bool = False,
+            number_if_taken: bool = False) -> Node:
     """Joins the network under that name, or without one. `hub`: `tcp://host:port` or `unix:/path`; "":
-    GIMNET_HUB, else the hub of this machine. NoHub, NameTaken, BadName, Timeout, ..."""
+    GIMNET_HUB, else the hub of this machine. `number_if_taken`: else as NAME-2 ... NAME-99. NoHub, NameTaken, BadName, Timeout, ..."""
     options = sized(_c.gimi_node_options, name=to_text(name), hub=to_text(hub), description=to_text(description),
-                     timeout_ms=to_ms(timeout), wait_for_hub=wait_for_hub)
+                     timeout_ms=to_ms(timeout), wait_for_hub=wait_for_hub, number_if_taken=number_if_taken)
     handle = ctypes.c_uint64()
     errors.check(_c.lib.gimi_join(options, handle))
     return Node(handle.value)

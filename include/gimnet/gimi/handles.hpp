@@ -256,7 +256,8 @@ class Publisher {
 /// are the same subscription; with the last one it ends, as a Publisher does.
 class Subscription {
  public:
-  /// As Queue::receive() and Queue::try_receive().
+  /// As Queue::receive() and Queue::try_receive(). Errors also: silence
+  /// (SubscribeOptions::silence).
   Outcome<Message> receive(Timeout timeout = kForever) const {
     return detail::receive(handle_->value(), timeout);
   }

@@ -49,6 +49,8 @@ struct NodeOptions {
   bool keep_token = true;
   /// Shard of the hub wished for; honoured by a hub started with `--placement hint`.
   std::optional<std::uint8_t> shard{};
+  /// If the name is taken, join as NAME-2, NAME-3 ... NAME-99.
+  bool number_if_taken = false;
   /// Join as one who may change the hub: over its Unix socket, as root or as the user that runs it.
   /// Else: denied.
   bool administrator = false;
@@ -105,6 +107,8 @@ struct SubscribeOptions {
   std::size_t queue = 0;
   AtFullQueue at_full = AtFullQueue::overwrite_oldest;
   Timeout timeout{5000};  ///< for the hub's answer
+  /// Not 0: while nothing comes, receive() answers Status::silence once in that time.
+  Timeout silence{0};
   /// For experts: untaken messages, 1..1,024. 0: 2 with newest_only, else any number, and of
   /// Delivery::sync as many as the service allows, which is the most.
   std::uint32_t window = 0;
@@ -121,7 +125,7 @@ struct SendOptions {
   std::size_t window = 0;
   AtFullWindow at_full = AtFullWindow::wait;
   bool timestamp = false;  ///< tell the receiver when it was sent: 8 bytes more
-  std::uint32_t age_max_ms =
+  std::uint32_t age_ms_max =
       0;  ///< not 0: dropped on the way when older, by the clocks of the hubs
   /// Of a synchronized stream: once a message was lost, send() sends nothing more and answers
   /// not_delivered, for streams in which what comes later is worth nothing without what came
@@ -141,6 +145,7 @@ struct PublishOptions {
   /// The hub keeps the last message, up to 16 MiB, and gives it to each new subscriber first. See
   /// Publisher::retained().
   bool retain = false;
+  std::uint32_t age_ms_max = 0;  ///< as in SendOptions
 };
 
 /// A service that takes data, such as commands.

@@ -57,6 +57,7 @@ enum class Status : std::int32_t {
   busy = GIMI_BUSY,
   failed = GIMI_FAILED,
   gone = GIMI_GONE,
+  silence = GIMI_SILENCE,
 };
 
 /// Why a message did not arrive. gimnet/gimi_types.h explains them.

@@ -68,6 +68,18 @@ Core::Core(const NodeOptions& options)
 Core::~Core() { close(); }
 
 Outcome<std::shared_ptr<Core>> Core::join(const NodeOptions& options) {
+  constexpr int kNumberMax = 99;
+  auto joined = join_as(options);
+  NodeOptions numbered = options;
+  for (int number = 2; options.number_if_taken && joined.is(Status::name_taken); ++number) {
+    if (number > kNumberMax) break;
+    numbered.name = options.name + "-" + std::to_string(number);
+    joined = join_as(numbered);
+  }
+  return joined;
+}
+
+Outcome<std::shared_ptr<Core>> Core::join_as(const NodeOptions& options) {
   const std::shared_ptr<Core> core(new Core(options), [](Core* done) {
     // In a child after fork() its threads are missing, and its locks may be held: it stays.
     if (done->home().left()) return done->close();

@@ -50,6 +50,7 @@ class Core {
 
  private:
   explicit Core(const NodeOptions& options);
+  static Outcome<std::shared_ptr<Core>> join_as(const NodeOptions& options);
   [[nodiscard]] nif_status connect(const NodeOptions& options);
   [[nodiscard]] NodeState state_now() const;
 

@@ -12,12 +12,13 @@ namespace {
 // Not NIF's sentence: calls of NIF inside one that succeeds may change that.
 thread_local constinit std::array<char, GIMI_ERROR_BYTES_MAX + 1> t_sentence{};
 
-constexpr std::array<const char*, 25> kStatusTexts{
+constexpr std::array<const char*, 26> kStatusTexts{
     "done",         "timeout",       "closed",      "bad argument",   "no hub",
     "unknown host", "not connected", "bad version", "name taken",     "bad name",
     "refused",      "not found",     "taken",       "denied",         "limit reached",
     "too large",    "not delivered", "window full", "protocol error", "system error",
-    "forked",       "not retained",  "busy",        "failed",         "gone"};
+    "forked",       "not retained",  "busy",        "failed",         "gone",
+    "silence"};
 
 constexpr std::array<const char*, 11> kChangeTexts{
     "snapshot begins", "present", "snapshot ends", "joined",   "left", "away", "back",

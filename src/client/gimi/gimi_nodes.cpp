@@ -27,6 +27,7 @@ Outcome<NodeOptions> read(const gimi_node_options& given) {
   if (given.shard_plus_one != 0)
     options.shard = static_cast<std::uint8_t>(given.shard_plus_one - 1);
   options.administrator = given.administrator != 0;
+  options.number_if_taken = given.number_if_taken != 0;
   options.socket_receive_bytes = given.socket_receive_bytes;
   if (given.last_message_bytes != 0) options.last_message_bytes = given.last_message_bytes;
   if (given.message_bytes_max != 0) options.message_bytes_max = given.message_bytes_max;

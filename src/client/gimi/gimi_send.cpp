@@ -22,7 +22,7 @@ gimi_status with_send_options(const gimi_send_options* options, const Body& body
       return fail(GIMI_BAD_ARGUMENT, "at_full is none of GIMI_WAIT, GIMI_SKIP, GIMI_HOLD_LATEST");
     how.at_full = static_cast<AtFullWindow>(given.at_full);
     how.timestamp = given.timestamp != 0;
-    how.age_max_ms = given.age_ms_max;
+    how.age_ms_max = given.age_ms_max;
     how.end_at_loss = given.end_at_loss != 0;
     return body(how);
   });

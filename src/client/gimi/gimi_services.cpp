@@ -28,6 +28,7 @@ gimi_status gimi_advertise(gimi_handle node, const char* name, const gimi_publis
       how.retain = given.retain != 0;
       how.timestamp = given.no_timestamp == 0;
       how.metadata = text_of(given.metadata);
+      how.age_ms_max = given.age_ms_max;
       const auto service = found.core->services().advertise(found.core->state().name, name, how,
                                                             timeout_in_options(given.timeout_ms));
       if (!service) return fail(service.failure());
@@ -121,7 +122,6 @@ uint64_t gimi_published(gimi_handle publisher) {
   return count;
 }
 
-gimi_status gimi_retained(gimi_handle publisher) {
 uint64_t gimi_unsent(gimi_handle publisher) {
   uint64_t count = 0;
   static_cast<void>(with<PublisherObject>(publisher, [&](PublisherObject& found) -> gimi_status {
@@ -131,6 +131,7 @@ uint64_t gimi_unsent(gimi_handle publisher) {
   return count;
 }
 
+gimi_status gimi_retained(gimi_handle publisher) {
   return with<PublisherObject>(
       publisher, [](PublisherObject& found) { return answer(found.service.retained()); });
 }
@@ -183,6 +184,11 @@ gimi_status gimi_subscribe(gimi_handle node, const char* full_name,
       how.timeout = timeout_in_options(given.timeout_ms);
       how.window = given.window;
       how.depth = given.depth;
+      how.silence = Timeout{given.silence_ms};
+      if (given.silence_ms < 0) {
+        return fail(GIMI_BAD_ARGUMENT, "cannot subscribe to '" + text_of(full_name) +
+                                           "': silence_ms is negative; 0 is without an answer");
+      }
       if (how.newest_only && how.queue > 1) {
         return fail(GIMI_BAD_ARGUMENT, "cannot subscribe to '" + text_of(full_name) +
                                            "': newest_only keeps one message, so that a queue of " +

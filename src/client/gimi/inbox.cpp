@@ -37,9 +37,11 @@ MessageQueue& Inbox::queue(MessageKey key, const QueueOptions* options) {
   return *found;
 }
 
-MessageQueue& Inbox::add_queue(const QueueOptions& options) {
+MessageQueue& Inbox::add_queue(const QueueOptions& options, Timeout silence) {
   const MutexLock lock(mutex_);
-  return queues_.emplace_back(*this, options, bytes_max_);
+  MessageQueue& queue = queues_.emplace_back(*this, options, bytes_max_);
+  queue.expect(silence);
+  return queue;
 }
 
 void Inbox::remove(MessageQueue& queue) {
@@ -216,8 +218,13 @@ Outcome<Message> Inbox::receive(MessageQueue& queue, Timeout timeout,
     while (queue.empty()) {
       if (end_) return end_.failure("receive");
       if (left != nullptr && *left) return Failure{Status::closed, "the handle was closed"};
+      if (queue.tells_silence()) {
+        return Failure{Status::silence,
+                       "nothing came for " + std::to_string(queue.silence_ms()) + " ms"};
+      }
       if (is_over(deadline)) return none(timeout);
-      static_cast<void>(queue.filled().wait_until(mutex_, deadline));
+      static_cast<void>(
+          queue.filled().wait_until(mutex_, std::min(deadline, queue.silent_at_ns())));
     }
     message = queue.pop();
     news = news_of(queue);

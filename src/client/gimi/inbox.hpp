@@ -51,8 +51,9 @@ class Inbox {
 
   /// The queue of a key, made if there is none; with `options` changed to them.
   MessageQueue& queue(MessageKey key, const QueueOptions* options) GIMNET_EXCLUDES(mutex_);
-  /// A queue for a subscription, until remove().
-  MessageQueue& add_queue(const QueueOptions& options) GIMNET_EXCLUDES(mutex_);
+  /// A queue for a subscription, until remove(). `silence`: as in SubscribeOptions.
+  MessageQueue& add_queue(const QueueOptions& options, Timeout silence = Timeout{0})
+      GIMNET_EXCLUDES(mutex_);
   /// What waits there counts as taken. REQUIRES: add_queue() made it, and nobody uses it any more.
   void remove(MessageQueue& queue) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::size_t queues() GIMNET_EXCLUDES(mutex_);
@@ -73,6 +74,7 @@ class Inbox {
   void count_dropped() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::uint64_t dropped() GIMNET_EXCLUDES(mutex_);
 
+  /// Status::silence: nothing came for the time that add_queue() was told.
   /// `left`: set by leave(), in which case the answer is `closed`; null: nobody calls that.
   [[nodiscard]] Outcome<Message> receive(MessageQueue& queue, Timeout timeout,
                                          const std::atomic<bool>* left = nullptr)

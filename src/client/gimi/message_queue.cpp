@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "base/check.hpp"
+#include "client/gimi/ending.hpp"
 #include "client/gimi/message.hpp"
 
 namespace gimnet::gimi {
@@ -20,11 +21,23 @@ bool MessageQueue::refuses() const {
   return entries_.size() >= options_.messages || bytes_ >= bytes_max_;
 }
 
+void MessageQueue::expect(Timeout silence) {
+  silence_ = silence;
+  silent_at_ns_ = silence == Timeout{0} ? INT64_MAX : deadline_after(silence);
+}
+
+bool MessageQueue::tells_silence() {
+  if (!is_over(silent_at_ns_)) return false;
+  expect(silence_);
+  return true;
+}
+
 void MessageQueue::push(Message message, std::uint64_t arrival) {
   GIMNET_ASSERT(!refuses());
   make_room(options_.messages - 1);
   bytes_ += message.size();
   ++received_;
+  if (silent_at_ns_ != INT64_MAX) expect(silence_);
   entries_.push_back({std::move(message), arrival});
 }
 

@@ -44,6 +44,14 @@ class MessageQueue {
   /// The oldest one counts as overwritten. Returns its bytes. REQUIRES: !empty().
   std::size_t overwrite_oldest();
 
+  /// Messages are expected at least once in that time; 0: they are not.
+  void expect(Timeout silence);
+  /// When nothing will have come for that long, and nobody was told; steady; INT64_MAX: never.
+  [[nodiscard]] std::int64_t silent_at_ns() const { return silent_at_ns_; }
+  /// That is now, and counts as told.
+  [[nodiscard]] bool tells_silence();
+  [[nodiscard]] std::int64_t silence_ms() const { return silence_.count(); }
+
   /// What went out of it since the last call, popped or overwritten.
   [[nodiscard]] std::vector<TakenMessages> take_taken() { return std::exchange(taken_, {}); }
 
@@ -80,6 +88,8 @@ class MessageQueue {
   std::size_t bytes_ = 0;
   std::uint64_t received_ = 0;
   std::uint64_t overwritten_ = 0;
+  Timeout silence_{0};
+  std::int64_t silent_at_ns_ = INT64_MAX;
   Condition filled_;
   WaitSource source_;
 };

@@ -96,7 +96,7 @@ void SendStream::hold_again(std::vector<std::byte> data) {
 nif_status SendStream::transmit(const Destination& to, const proto::gimi::MessageHeader& header,
                                 BytesView data, More more, std::int32_t timeout_ms) const {
   const bool synchronized = options_.window != 0;
-  Envelope envelope{to.id, to.kind, NIF_POLICY_DEFAULT, options_.lane, to.key, options_.age_max_ms,
+  Envelope envelope{to.id, to.kind, NIF_POLICY_DEFAULT, options_.lane, to.key, options_.age_ms_max,
                     0};
   if (synchronized) envelope.flags |= NIF_FLAG_REPORT;
   if (more == More::yes) envelope.flags |= NIF_FLAG_MORE;

@@ -15,7 +15,7 @@ Outcome<void> PublishedService::publish(BytesView data, Timeout timeout, More mo
                     NIF_POLICY_DEFAULT,
                     options_.lane,
                     options_.key,
-                    0,
+                    options_.age_ms_max,
                     NIF_FLAG_NOT_WHILE_AWAY};
   if (options_.delivery == Delivery::latest) envelope.policy = NIF_LATEST;
   if (more == More::yes) envelope.flags |= NIF_FLAG_MORE;

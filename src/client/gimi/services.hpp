@@ -98,7 +98,7 @@ struct Share {
 /// outlives it.
 struct Reader {
   Reader(Inbox& inbox, const SubscribeOptions& options, bool latest)
-      : wish(options), queue(inbox.add_queue(queue_options(latest))) {}
+      : wish(options), queue(inbox.add_queue(queue_options(latest), options.silence)) {}
   ~Reader() { queue.inbox().remove(queue); }
   Reader(const Reader&) = delete;
   Reader& operator=(const Reader&) = delete;

@@ -88,7 +88,7 @@ nif_status Uplink::transmit(const Envelope& envelope, proto::gimi::MessageHeader
   outgoing.key = proto::gimi::StreamKey{envelope.key.type, envelope.key.instance}.value();
   outgoing.parts = parts.data();
   outgoing.part_count = parts.size();
-  outgoing.age_ms_max = envelope.age_max_ms;
+  outgoing.age_ms_max = envelope.age_ms_max;
   outgoing.trace_slots = envelope.trace_slots;
   nif::Node* const direct = direct_.load();
   if (direct == nullptr) return NIF_CLOSED;

@@ -36,7 +36,7 @@ struct Envelope {
   nif_policy policy = NIF_POLICY_DEFAULT;
   Lane lane = Lane::normal;
   MessageKey key;
-  std::uint32_t age_max_ms = 0;
+  std::uint32_t age_ms_max = 0;
   unsigned flags = 0;  ///< NIF_FLAG_*; KEYED is added
   std::uint8_t trace_slots = 0;
 };

@@ -47,13 +47,13 @@ TEST(Outcome, OfNothing) {
 
 TEST(Outcome, EveryStatusHasItsOwnText) {
   std::set<std::string_view> texts;
-  for (gimi_status status = GIMI_OK; status <= GIMI_GONE; ++status)
+  for (gimi_status status = GIMI_OK; status <= GIMI_SILENCE; ++status)
     texts.insert(gimi_status_text(status));
   for (const gimi_status status : {GIMI_NOT_TRUSTED, GIMI_NO_RIGHT, GIMI_EXPIRED})
     texts.insert(gimi_status_text(status));
-  EXPECT_EQ(texts.size(), std::size_t{GIMI_GONE} + 1 + 3);
+  EXPECT_EQ(texts.size(), std::size_t{GIMI_SILENCE} + 1 + 3);
   EXPECT_FALSE(texts.contains("unknown status"));
-  for (const gimi_status status : {GIMI_GONE + 1, GIMI_EXPIRED + 1, -1, INT32_MIN})
+  for (const gimi_status status : {GIMI_SILENCE + 1, GIMI_EXPIRED + 1, -1, INT32_MIN})
     EXPECT_STREQ(gimi_status_text(status), "unknown status");
 }
 

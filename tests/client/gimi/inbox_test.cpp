@@ -79,6 +79,20 @@ TEST_F(InboxTest, AQueueThatNobodyReadsAnyMoreHoldsNobodyUp) {
   EXPECT_TRUE(inbox_.receive_any(kNoWait).is(Status::timeout)) << "what waited is dropped";
 }
 
+TEST_F(InboxTest, TellsSilenceOnceInItsTimeWhileNothingComes) {
+  MessageQueue& silent = inbox_.add_queue({}, Timeout{1});
+  for (int i = 0; i < 2; ++i) {
+    const auto nothing = inbox_.receive(silent, kForever);
+    ASSERT_TRUE(nothing.is(Status::silence));
+    EXPECT_EQ(nothing.failure().sentence, "nothing came for 1 ms");
+  }
+  MessageQueue& expecting = inbox_.add_queue({}, std::chrono::hours{1});
+  EXPECT_TRUE(inbox_.receive(expecting, kNoWait).is(Status::timeout));
+  Message message = make_message("x");
+  EXPECT_TRUE(inbox_.put(silent, message, nullptr));
+  EXPECT_TRUE(inbox_.receive(silent, kForever)) << "it waits, however long nothing else came";
+}
+
 TEST(Inbox, CountsWhatWaitsInAQueueThatGoesAsTaken) {
   std::uint32_t taken = 0;
   Inbox inbox(2, 1000, [] {}, [&taken](const TakenMessages& some, bool) { taken += some.count; });

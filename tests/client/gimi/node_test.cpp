@@ -113,6 +113,17 @@ TEST_F(NodeTest, SaysWhyItCannotJoin) {
   EXPECT_TRUE(Node::join(options).is(Status::bad_argument));
 }
 
+TEST_F(NodeTest, JoinsUnderTheNextNumberIfItsNameIsTaken) {
+  const NodeOptions options{.name = "robot", .hub = hub_.url(), .number_if_taken = true};
+  std::vector<Node> nodes;
+  for (const char* name : {"robot", "robot-2", "robot-3"}) {
+    nodes.push_back(Node::join(options).or_throw());
+    EXPECT_EQ(nodes.back().state().name, name);
+  }
+  nodes.erase(nodes.begin() + 1);
+  EXPECT_EQ(Node::join(options)->state().name, "robot-2") << "it is free again";
+}
+
 TEST_F(NodeTest, SendsToANodeThatWasFound) {
   const Node sender = join();
   const Node receiver = join("B");

@@ -143,7 +143,7 @@ TEST_F(SendStreamTest, AReportThatNamesNoMessageIsTheReasonOfWhatTheReceiverMiss
   SendOptions options;
   options.key = kKey;
   options.window = 3;
-  options.age_max_ms =
+  options.age_ms_max =
       60'000;  // stands before the fragment header in the bytes that a report repeats
   const Sender stream = node_->sender(Peer{kPeerId}, options).or_throw();
   stream.send(std::string(5'000, 'x')).or_throw();

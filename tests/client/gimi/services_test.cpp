@@ -5,9 +5,13 @@
 
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "gimnet/gimi.hpp"
+#include "proto/control/ns.hpp"
+#include "proto/frame/extensions.hpp"
+#include "tests/client/gimi/support/conversation.hpp"
 #include "tests/client/gimi/support/hub_process.hpp"
 
 // Every wish of a subscriber, of services of every delivery.
@@ -132,6 +136,15 @@ TEST_F(Wishes, OfAWindowOrADepthWorkWithEveryDelivery) {
   EXPECT_LE(newest.size(), 3u);
 }
 
+TEST_F(Wishes, TellSilenceFromTheEnd) {
+  offer(Delivery::stream);
+  const Subscription subscription = subscribe({.silence = Timeout{20}});
+  EXPECT_TRUE(subscription.receive(kWait).is(Status::silence));
+  publish(1);
+  EXPECT_EQ(subscription.receive(kWait)->text(), "1");
+  EXPECT_TRUE(subscription.receive(kWait).is(Status::silence)) << "again";
+}
+
 TEST_F(Wishes, ThatContradictEachOtherAreRefusedWithASentence) {
   const auto refused = viewer_.subscribe("robot/eye", {.newest_only = true, .queue = 2});
   ASSERT_TRUE(refused.is(Status::bad_argument));
@@ -184,6 +197,27 @@ TEST_F(Wishes, TheLastMessageIsForEachThatSubscribesLaterAndForNobodyTwice) {
   EXPECT_EQ(second.receive(kWait)->text(), "2");
   EXPECT_EQ(first.receive(kWait)->text(), "2") << "the first message came once";
   EXPECT_EQ(first.missed() + second.missed(), 0u);
+}
+
+class PublishedServices : public gimi::test::Conversation {};
+
+TEST_F(PublishedServices, SayTheLongestAgeOfTheirMessages) {
+  std::optional<Publisher> odometry;
+  std::thread asking(
+      [&] { odometry.emplace(node_->advertise("odom", {.age_ms_max = 250}).or_throw()); });
+  std::uint16_t number = 0;
+  ASSERT_TRUE(hub_.next_request<proto::ns::Advertise>(number));
+  const proto::ns::AdvertiseAnswer answer{GroupId{(7u << 20) | 11}, 1};
+  hub_.send_control(proto::Kind::ns, proto::encode_answer(answer, number));
+  asking.join();
+  odometry->publish("x", kForever).or_throw();
+  const auto frame = hub_.next_message();
+  ASSERT_TRUE(frame);
+  const auto age = proto::find_age(frame->view().extensions);
+  ASSERT_TRUE(age);
+  EXPECT_EQ(age->longest_ms, 250u);
+  hub_.close();
+  node_->close();
 }
 
 }  // namespace
