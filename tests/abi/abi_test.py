@@ -1,16 +1,21 @@
 #!/usr/bin/env python3
 """libgimnet.so offers exactly the functions of the public headers, and their structs and constants are those that are kept in
-layout.txt and src/client/gimnet.map. docs/compatibility.md says what is promised.
+layout.txt and src/client/gimnet.map; and it runs the programs of kept.py, those of today and those that are kept.
+docs/compatibility.md says what is promised.
 
-    abi_test.py LIBRARY C_COMPILER
+    abi_test.py LIBRARY TCPHUB C_COMPILER
     abi_test.py --update C_COMPILER      writes layout.txt anew"""
 
+import itertools
+import os
 import pathlib
 import re
 import subprocess
 import sys
+import tempfile
 import unittest
 
+import kept
 import public_headers
 
 LAYOUT = pathlib.Path(__file__).with_name("layout.txt")
@@ -74,10 +79,41 @@ class Layout(unittest.TestCase):
         self.assertEqual(public_headers.layout(COMPILER), kept)
 
 
+class Programs(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory(prefix="gimnet-test-")
+        cls.addClassCleanup(folder.cleanup)
+        today = pathlib.Path(folder.name) / "today"
+        today.mkdir()
+        kept.compile_programs(pathlib.Path(LIBRARY).resolve().parent, today)
+        cls.folders = [today, *kept.folders()]
+        cls.environment = os.environ | {"LD_LIBRARY_PATH": str(pathlib.Path(LIBRARY).resolve().parent), "XDG_RUNTIME_DIR": folder.name}
+        hub = subprocess.Popen([TCPHUB, "--listen", f"unix:{folder.name}/hub", "--log-level", "error", "--state-dir", f"{folder.name}/state"],
+                               stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True)
+        cls.addClassCleanup(hub.communicate)
+        cls.addClassCleanup(hub.kill)
+        cls.hub = hub.stdout.readline().split()[1]
+
+    def run_program(self, *words):
+        ran = subprocess.run(list(map(str, words)), stdin=subprocess.DEVNULL, capture_output=True, text=True, env=self.environment,
+                             timeout=TIMEOUT_S, check=False)
+        self.assertEqual((ran.returncode, ran.stdout), (0, "all is as it was\n"), f"{words[0]}: {ran.stderr}")
+
+    def test_in_c_run(self):
+        for folder in self.folders:
+            self.run_program(folder / "program_c", self.hub)
+
+    def test_in_cpp_run_with_plugins_of_every_version(self):
+        for folder, of_plugin in itertools.product(self.folders, self.folders):
+            self.run_program(folder / "program_cpp", self.hub, of_plugin / "plugin.so")
+
+
 if __name__ == "__main__":
     COMPILER = sys.argv.pop()
     if sys.argv[1:] == ["--update"]:
         LAYOUT.write_text("\n".join([*public_headers.layout(COMPILER), ""]))
     else:
+        TCPHUB = sys.argv.pop()
         LIBRARY = sys.argv.pop()
         unittest.main()
