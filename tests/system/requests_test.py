@@ -14,7 +14,7 @@ USAGE, NOT_FOUND, TIMEOUT = 2, 4, 5
 
 class Requests(unittest.TestCase):
     def setUp(self):
-        self.hub = Hub(self)
+        self.hub = Hub(self, "--accept-links")
 
     def answer(self, *options):
         answer = start_gimnet(self, self.hub, "answer", "B/mirror", "--echo", *options)
@@ -43,6 +43,16 @@ class Requests(unittest.TestCase):
             ended = run_gimnet(self.hub, "request", service, "hello")
             self.assertEqual(ended.code, NOT_FOUND, ended.err)
             self.assertIn(service, ended.err)
+
+    def test_a_hub_that_has_just_started_waits_for_the_names_of_others(self):
+        self.answer()
+        far = Hub(self, "--link", self.hub.url, hub_id=8)
+        for _ in range(2):
+            asked = run_gimnet(far, "request", "B/mirror", "hello")
+            self.assertEqual((asked.code, asked.out), (0, b"hello\n"), asked.err)
+            far.process.signal(signal.SIGKILL)
+            far.process.wait()
+            far = far.again(self)
 
     def test_no_answer_in_time(self):
         answer = self.answer()
