@@ -99,6 +99,13 @@ class Operations(unittest.TestCase):
         documented = set(re.findall(r"^\| ([a-z_.]+) \| (?:`--|none)", text, re.MULTILINE))
         self.assertEqual(documented, set(keys_in(printed(self.tcphub).split("[limits]")[0])))
 
+    def test_documents_the_environment_of_programs(self):
+        read = set()
+        for path in [*(ROOT / "src" / "client").rglob("*.cpp"), *(ROOT / "src" / "tools").rglob("*.cpp"), *(ROOT / "python").rglob("*.py")]:
+            read |= set(re.findall(r'"(GIMNET_[A-Z_]+)"', path.read_text(encoding="utf-8")))
+        text = (ROOT / "docs" / "operations.md").read_text(encoding="utf-8")
+        self.assertEqual(set(re.findall(r"^\| `(GIMNET_[A-Z_]+)` \|", text, re.M)), read)
+
     def test_the_example_is_the_default_configuration(self):
         example = ROOT / "docs" / "tcphub.toml"
         checked = subprocess.run([self.tcphub, "--check-config", "--config", example], capture_output=True, text=True,

@@ -55,9 +55,10 @@ PAGES = {
 
 
 def documents():
-    """All that may show code, by their paths in the tree."""
+    """All that may show code, by their paths in the tree. tests/install/tutorial_test.py runs that of the tutorial."""
     found = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(ROOT / "examples").glob("*.md"), *INCLUDE.rglob("*.h*")]
-    return {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8") for path in sorted(found)}
+    return {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8") for path in sorted(found)
+            if path.parent.name != "tutorial"}
 
 
 def paragraphs(name, text):
