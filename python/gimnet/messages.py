@@ -155,6 +155,7 @@ class NodeRecord:
 
     @classmethod
     def of(cls, raw: Any) -> NodeRecord:
+        """From the library's struct."""
         return cls(Peer(raw.id), raw.name.decode(), raw.hub_id, raw.hub_name.decode(), raw.description.decode(),
                    raw.place.decode(), raw.joined_ms / 1e3, raw.services, bool(raw.connected))
 
@@ -180,6 +181,7 @@ class ServiceRecord:
 
     @classmethod
     def of(cls, raw: Any) -> ServiceRecord:
+        """From the library's struct."""
         delivery = _DELIVERY_NAMES.get(raw.delivery, f"unknown {raw.delivery}")
         return cls(raw.name.decode(), raw.hub_name.decode(), raw.metadata.decode(), Peer(raw.node),
                    (raw.key.type, raw.key.instance), raw.direction == _c.GIMI_ACCEPTS, delivery, raw.window,
@@ -198,6 +200,7 @@ class Event:
 
     @classmethod
     def of(cls, raw: Any) -> Event:
+        """From the library's struct."""
         return cls(_c.lib.gimi_change_text(raw.change).decode(), NodeRecord.of(raw.node.contents) if raw.node else None,
                    ServiceRecord.of(raw.service.contents) if raw.service else None,
                    (raw.former_name or b"").decode(), (raw.why or b"").decode())

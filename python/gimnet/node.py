@@ -96,6 +96,7 @@ class Publisher(Blocking):
 
     @property
     def subscribers(self) -> int:
+        """Their number, as the hub told last. With 0 nothing is sent."""
         return int(_c.lib.gimi_subscribers(self._handle))
 
     def wait_for_subscribers(self, count: int = 1, timeout: Optional[float] = None) -> None:
@@ -141,6 +142,7 @@ class Node(Waitable):
         return handle.value
 
     def state(self) -> State:
+        """The connection now, or as it was last."""
         raw = sized(_c.gimi_node_state)
         self.check(_c.lib.gimi_state(self._handle, raw))
         return State(Peer(raw.id), raw.name.decode(), raw.hub_id, raw.hub_name.decode(), bool(raw.connected), bool(raw.ended),
@@ -149,10 +151,12 @@ class Node(Waitable):
 
     @property
     def id(self) -> Peer:
+        """By which others know this node; Peer(0) if it is closed."""
         return Peer(_c.lib.gimi_id(self._handle))
 
     @property
     def name(self) -> str:
+        """As the hub knows it; "" of a node without a name."""
         return self.state().name
 
     def advertise(self, name: str, *, delivery: str = "stream", window: int = 0, retain: bool = False,
