@@ -9,7 +9,7 @@ import select
 import threading
 import time
 import weakref
-from typing import Any, Callable, Generic, Iterator, Optional, Type, TypeVar
+from typing import Any, Callable, Generic, Iterator, Optional, Tuple, Type, TypeVar
 
 from . import _c, errors
 
@@ -23,18 +23,27 @@ Raw = TypeVar("Raw", bound=ctypes.Structure)
 
 def to_ms(seconds: float) -> int:
     """Milliseconds for the options of a call, at least 1. 0 would be the library's default."""
+    if not isinstance(seconds, (int, float)):
+        raise TypeError(f"a time is a number of seconds, and this is a {type(seconds).__name__}")
     if not 0 <= seconds <= TIMEOUT_MS_MAX / 1000:
         raise errors.BadArgument(f"a time of {seconds} s: use 0 to {TIMEOUT_MS_MAX // 1000}")
     return max(1, round(seconds * 1000))
 
 
-def end_of(timeout: Optional[float]) -> float:
-    """The time at which a wait of so many seconds ends; None: never."""
+def check_time(timeout: Optional[float]) -> None:
+    """A time that is none is told also if nothing has to be waited for."""
     if timeout is None:
-        return math.inf
+        return
+    if not isinstance(timeout, (int, float)):
+        raise TypeError(f"a time is a number of seconds, or None for no limit, and this is a {type(timeout).__name__}")
     if not timeout >= 0:
         raise errors.BadArgument(f"a time of {timeout} s: use 0 or more, or None for no limit")
-    return time.monotonic() + timeout
+
+
+def end_of(timeout: Optional[float]) -> float:
+    """The time at which a wait of so many seconds ends; None: never."""
+    check_time(timeout)
+    return math.inf if timeout is None else time.monotonic() + timeout
 
 
 def left_ms(end: float, most: int) -> int:
@@ -46,6 +55,7 @@ def left_ms(end: float, most: int) -> int:
 def in_pieces(timeout: Optional[float], call: Callable[[int], Any], ended: Callable[[], bool] = lambda: False) -> int:
     """Calls with milliseconds until the status is not GIMI_TIMEOUT, or that is the end, or the seconds are
     over; None: no limit."""
+    check_time(timeout)
     status = int(call(0))
     if status != _c.GIMI_TIMEOUT or ended():
         return status
@@ -59,18 +69,42 @@ def in_pieces(timeout: Optional[float], call: Callable[[int], Any], ended: Calla
 
 
 def to_text(text: str) -> bytes:
+    if not isinstance(text, str):
+        raise TypeError(f"{text!r} is a {type(text).__name__}, and a str is needed here")
     if "\0" in text:
         raise errors.BadArgument(f"{text!r} has a zero byte")
     return text.encode()
 
 
 def sized(made: Type[Raw], **members: Any) -> Raw:
-    return made(struct_size=ctypes.sizeof(made), **members)
+    """ctypes would cut numbers that are too large, and take negative ones for large ones."""
+    raw = made(struct_size=ctypes.sizeof(made))
+    for name, value in members.items():
+        try:
+            setattr(raw, name, value)
+        except TypeError:
+            raise TypeError(f"{name} cannot be a {type(value).__name__}: {value!r}") from None
+        if isinstance(value, int) and getattr(raw, name) != value:
+            raise errors.BadArgument(f"{name} cannot be {value}")
+    return raw
+
+
+def to_key(key: Tuple[int, int]) -> _c.gimi_key:
+    try:
+        kind, instance = key
+        raw = _c.gimi_key(kind, instance)
+    except (TypeError, ValueError):
+        raise TypeError(f"a key is a type and an instance, two numbers such as (1, 0), and this is {key!r}") from None
+    if (raw.type, raw.instance) != (kind, instance):
+        raise errors.BadArgument(f"the numbers of a key are 0 to 2**32 - 1, and these are {key!r}")
+    return raw
 
 
 class Handle:
     """Ends with close(), or with its node. One that is not `kept` also ends when nobody has it any more.
     Safe in every thread."""
+
+    _handle, _kept = 0, True  # of one that was never made
 
     def __init__(self, handle: int, kept: bool = False) -> None:
         self._handle = handle
@@ -90,6 +124,8 @@ class Handle:
         """A thread that waits while the program ends goes without a word."""
         if status == _c.GIMI_CLOSED and Exit.begun:
             raise SystemExit
+        if status == _c.GIMI_CLOSED and not self._handle:
+            raise errors.Closed(f"this {type(self).__name__} was closed")
         errors.check(status)
 
 
@@ -191,6 +227,7 @@ class Waitable(Blocking):
             self._set.wake()
 
     def until(self, timeout: Optional[float], call: Callable[[int], Any]) -> int:
+        check_time(timeout)
         status = int(call(0))
         if status != _c.GIMI_TIMEOUT:
             return status

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any, Deque, Dict, Iterator, List, Optional, Tuple, Type, Union
 
 from . import _c, errors, messages
-from .handles import Blocking, Exit, Handle, Raw, Stream, Waitable, in_pieces, sized, to_ms, to_text
+from .handles import Blocking, Exit, Handle, Raw, Stream, Waitable, in_pieces, sized, to_key, to_ms, to_text
 from .messages import Event, Message, NodeRecord, Peer, ServiceRecord
 from .requests import Answers, Pending, Reply
 
@@ -167,7 +167,7 @@ class Node(Waitable):
         Denied (a node without a name)."""
         if delivery not in messages.DELIVERIES:
             raise errors.BadArgument(f"there is no delivery {delivery!r}: use {', '.join(messages.DELIVERIES)}")
-        options = sized(_c.gimi_publish_options, key=_c.gimi_key(*key), delivery=messages.DELIVERIES[delivery], window=window,
+        options = sized(_c.gimi_publish_options, key=to_key(key), delivery=messages.DELIVERIES[delivery], window=window,
                          retain=retain, metadata=to_text(metadata), timeout_ms=to_ms(timeout),
                          age_ms_max=to_ms(age_max) if age_max else 0)
         return Publisher(self, self._opened(_c.lib.gimi_advertise, to_text(name), options))
@@ -186,7 +186,7 @@ class Node(Waitable):
     def accept(self, name: str, *, queue: int = 0, key: Tuple[int, int] = (0, 0), metadata: str = "",
                timeout: float = 5.0) -> Source:
         """Takes the commands that others send to `own name/name`, until close() or the end of the node."""
-        options = sized(_c.gimi_accept_options, key=_c.gimi_key(*key), messages=queue, metadata=to_text(metadata),
+        options = sized(_c.gimi_accept_options, key=to_key(key), messages=queue, metadata=to_text(metadata),
                          timeout_ms=to_ms(timeout))
         return Source(self, self._opened(_c.lib.gimi_accept, to_text(name), options), kept=True)
 

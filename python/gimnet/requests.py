@@ -6,7 +6,7 @@ import ctypes
 from typing import Any, Dict, Optional
 
 from . import _c, bitestream, errors, messages
-from .handles import Handle, Stream, Waitable, in_pieces
+from .handles import Handle, Stream, Waitable, in_pieces, to_text
 from .messages import Peer
 
 __all__ = ["Answers", "Pending", "Reply", "Request"]
@@ -84,8 +84,10 @@ class Request(_Content):
         errors.check(status)
 
     def fail(self, code: int, sentence: str = "") -> None:
-        """Answers with an error of the program's own. Closed."""
-        errors.check(_c.lib.gimi_fail_request(self._raw, code, sentence.encode()))
+        """Answers with an error of the program's own; a code has 32 bits. Closed."""
+        if ctypes.c_int32(code).value != code:
+            raise errors.BadArgument(f"the code of an error has 32 bits, and this is {code}")
+        errors.check(_c.lib.gimi_fail_request(self._raw, code, to_text(sentence)))
 
     def __del__(self) -> None:
         _c.lib.gimi_request_release(self._raw)

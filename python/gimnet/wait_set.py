@@ -33,6 +33,8 @@ class WaitSet(Handle):
 
     def add(self, source: Waitable, value: Any = None) -> None:
         """`value` is what wait() gives for it; None: itself. Taken: it is in a set; Closed."""
+        if not isinstance(source, Waitable):
+            raise TypeError(f"nothing is received from a {type(source).__name__}: add a subscription, a service, a watch, ...")
         source.leave_own_set()
         status = _c.lib.gimi_wait_set_add(self._handle, source.number, source.number)
         source.shared = status == _c.GIMI_OK

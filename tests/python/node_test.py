@@ -181,6 +181,45 @@ class Nodes(unittest.TestCase):
         with self.assertRaises(gimnet.NotFound):
             wait_until(lambda: self.viewer.find("short") is None, "never")
 
+    def test_mistakes_are_told_with_a_sentence(self):
+        pose, accepted = self.robot.advertise("pose"), self.robot.accept("drive")
+        answers = self.robot.answer("add")
+        left = gimnet.connect(hub=self.hub.url)
+        subscription, waits = left.subscribe("robot/pose"), gimnet.WaitSet()
+        left.close()
+        pending = self.viewer.request_later("robot/add", "1", PATIENCE_S)
+        request = answers.receive(PATIENCE_S)
+        mistakes = [
+            (TypeError, "None is a NoneType", lambda: gimnet.connect(None)),
+            (TypeError, "a str is needed", lambda: self.robot.advertise(b"x")),
+            (TypeError, "a str is needed", lambda: self.viewer.request(17, "x")),
+            (TypeError, "a str is needed", lambda: self.robot.advertise("y", metadata=None)),
+            (TypeError, "queue cannot be a str: '1'", lambda: self.viewer.subscribe("robot/pose", queue="1")),
+            (gimnet.BadArgument, "queue cannot be -1", lambda: self.viewer.subscribe("robot/pose", queue=-1)),
+            (gimnet.BadArgument, f"window cannot be {1 << 32}", lambda: self.viewer.subscribe("robot/pose", window=1 << 32)),
+            (gimnet.BadArgument, "rate", lambda: self.viewer.subscribe("robot/pose", rate_hz=float("nan"))),
+            (TypeError, "such as (1, 0)", lambda: self.robot.advertise("y", key=1)),
+            (gimnet.BadArgument, "(-1, 0)", lambda: self.robot.advertise("y", key=(-1, 0))),
+            (gimnet.BadArgument, "a time of -1 s", lambda: accepted.receive(-1)),
+            (gimnet.BadArgument, "a time of nan s", lambda: pose.publish("x", timeout=float("nan"))),
+            (gimnet.BadArgument, "a time of inf s", lambda: self.viewer.find("robot", timeout=float("inf"))),
+            (TypeError, "number of seconds", lambda: accepted.receive("1")),
+            (TypeError, "number of seconds", lambda: self.viewer.find("robot", timeout=None)),
+            (TypeError, "from a Publisher", lambda: waits.add(pose)),
+            (gimnet.BadArgument, "32 bits", lambda: request.fail(1 << 40)),
+            (TypeError, "a str is needed", lambda: request.fail(1, None)),
+            (gimnet.Closed, "this Node was closed", left.state),
+            (gimnet.Closed, "this Node was closed", lambda: left.subscribe("robot/pose")),
+            (gimnet.Closed, "the node was closed", lambda: subscription.receive(PATIENCE_S)),
+            (TypeError, "handle", gimnet.Node),
+        ]
+        for number, (error, words, call) in enumerate(mistakes):
+            with self.subTest(number, words=words), self.assertRaises(error) as raised:
+                call()
+            self.assertIn(words, str(raised.exception))
+        request.reply("2")
+        self.assertEqual(pending.receive(PATIENCE_S).text, "2")
+
 
 class Endings(unittest.TestCase):
     def setUp(self):
