@@ -347,41 +347,32 @@ bool Declarations::is_subscribed(GroupId group) const {
 
 void Declarations::on_subscribed(const std::string& full_name, const proto::Payload& payload) {
   const auto answer = proto::decode_answer<proto::ns::SubscribeAnswer>(payload);
-  const GroupId group = answer ? answer->group : GroupId{};
-  const NodeId provider = answer ? answer->provider : NodeId{};
-  const std::uint64_t session = answer ? answer->session : 0;
-  GroupId former;
-  bool changed = false;
+  const auto now = answer ? *answer : proto::ns::SubscribeAnswer{};
   {
     const MutexLock lock(mutex_);
     const auto found = subscriptions_.find(full_name);
-    if (found != subscriptions_.end()) {
-      former = std::exchange(found->second.group, group);
-      // A hub that began anew may give another program the same group.
-      changed = std::exchange(found->second.provider, provider) != provider;
-      changed |= std::exchange(found->second.session, session) != session;
-      const bool ended = found->second.ended;
-      const bool was_refused = std::exchange(found->second.refused, !answer);
-      // Also that the hub takes it again while nobody provides it: a program that was told of the
-      // refusal has to know.
-      changed |= former != group || was_refused == answer.has_value();
-      changed = changed && !ended;
-      // Requests of the program in between may never have left.
-      if (ended) subscriptions_due_.push_back(full_name);
-      // Its SERVICE_MOVED was lost with the connection. A hub that began anew may have given it to
-      // another one.
-      if (former != group && !is_subscribed(former)) credits_.forget(former);
-    }
+    if (found == subscriptions_.end()) return;
+    Subscription& known = found->second;
+    const GroupId former = std::exchange(known.group, now.group);
+    // A hub that began anew may give another program the same group.
+    bool changed = former != now.group;
+    changed |= std::exchange(known.provider, now.provider) != now.provider;
+    changed |= std::exchange(known.session, now.session) != now.session;
+    // Also that the hub takes it again: a program that was told of the refusal has to know.
+    changed |= std::exchange(known.refused, !answer) == answer.has_value();
+    // Requests of the program in between may never have left.
+    if (known.ended) subscriptions_due_.push_back(full_name);
+    // Its SERVICE_MOVED was lost with the connection, and the id may be of another one now.
+    if (former != now.group && !is_subscribed(former)) credits_.forget(former);
+    if (known.ended || !changed) return;
   }
-  if (changed) {
-    Record* record = make_event(NIF_SERVICE_MOVED, full_name);
-    if (answer) {
-      put_service(record->incoming, *answer);
-    } else {
-      add_refusal(*record, answer.error());
-    }
-    events_.push_back(item_of(record, full_name.size()));
+  Record* record = make_event(NIF_SERVICE_MOVED, full_name);
+  if (answer) {
+    put_service(record->incoming, *answer);
+  } else {
+    add_refusal(*record, answer.error());
   }
+  events_.push_back(item_of(record, full_name.size()));
 }
 
 bool Declarations::may_wait(GroupId group, std::size_t bytes) {
