@@ -225,10 +225,7 @@ void complete_links(Configuration& configuration, Faults& faults) {
         {place, not_encrypted(link.address, place.empty() ? "--insecure" : "insecure = true")});
   }
   if (const std::string why = terms_fault(options.links.accepted); !why.empty()) {
-    auto where = configuration.places.find("links.silent_ms");
-    if (where == configuration.places.end())
-      where = configuration.places.find("links.keep_alive_ms");
-    faults.push_back({where == configuration.places.end() ? "" : where->second.place,
+    faults.push_back({place_of_either(configuration, "links.silent_ms", "links.keep_alive_ms"),
                       "of accepted links " + why});
   }
 }

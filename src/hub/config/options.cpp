@@ -207,19 +207,16 @@ std::string checked(const CommandLine& line) {
 }
 
 std::variant<CommandLine, CommandLineEnding> read_all(const CLI::App& app, CommandLine line) {
-  ReadConfiguration read = read_configuration(line.sources, {.pipes = true});
+  ReadConfiguration read = read_configuration(line.sources, true);
   if (!read.faults.empty()) {
     CommandLineEnding ending{2, {}};
     for (const Fault& fault : read.faults) ending.text += fault.line() + "\n";
-    if (read.more_faults)
-      ending.text += "tcphub: there are more faults; mend these, then look again\n";
     return ending;
   }
   // Read again it is the same file, or an error: a hub does not lose its configuration because a
   // file went.
   line.sources.file = read.place.file;
   line.sources.parts_alone = read.place.parts_alone;
-  for (const Fault& warning : read.warnings) line.warnings.push_back(warning.text());
   line.configuration = std::move(read.configuration);
   line.files = std::move(read.files);
   if (is_on(app, "--check-config")) return CommandLineEnding{0, checked(line)};

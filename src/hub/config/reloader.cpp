@@ -1,51 +1,20 @@
 #include "hub/config/reloader.hpp"
 
-#include <optional>
+#include <algorithm>
+#include <span>
 #include <string>
-#include <system_error>
-#include <thread>
 #include <utility>
-
-#include "base/log.hpp"
 
 namespace gimnet::hub {
 
-std::optional<ReadConfiguration> ConfigReader::read(const ConfigSources& sources,
-                                                    const ReadOptions& how) {
-  using std::future_status;
-  if (begun_.valid() && begun_.wait_for(std::chrono::seconds{0}) != future_status::ready)
-    return std::nullopt;
-  std::packaged_task<ReadConfiguration()> reading(
-      [read = read_, sources, how] { return read(sources, how); });
-  begun_ = reading.get_future();
-  std::thread(std::move(reading)).detach();
-  if (begun_.wait_for(patience_) != future_status::ready) return std::nullopt;
-  return begun_.get();
-}
-
 Reloading Reloader::read_again() {
   Reloading reloading;
-  std::optional<ReadConfiguration> found;
-  try {
-    found = reader_.read(sources_, {.faults_max = kReloadFaultsMax});
-  } catch (const std::system_error& error) {
-    reloading.faults.push_back(
-        "cannot begin to read the configuration: " + error.code().message() +
-        "; raise the limit on threads (ulimit -u), or let other programs go");
-    return reloading;
-  }
-  if (!found) {
-    const std::string where = sources_.file.empty() ? "" : " (" + sources_.file + ")";
-    reloading.faults.push_back("the configuration" + where +
-                               " could not be read in time: the disk does not answer; "
-                               "mend that, or keep it on a disk of this machine, and try again");
-    return reloading;
-  }
-  ReadConfiguration& read = *found;
-  for (const Fault& fault : read.faults) reloading.faults.push_back(fault.line());
-  reloading.more_faults = read.more_faults;
+  const ReadConfiguration read = read_configuration(sources_);
+  const std::size_t told = std::min(read.faults.size(), kReloadFaultsMax);
+  for (const Fault& fault : std::span(read.faults).first(told))
+    reloading.faults.push_back(fault.line());
+  reloading.more_faults = told < read.faults.size();
   if (!reloading.faults.empty()) return reloading;
-  for (const Fault& warning : read.warnings) log_warning(warning.text());
   // A file that appeared in a default place is the hub's from now on, and must not go unnoticed
   // when it goes.
   sources_.file = read.place.file;

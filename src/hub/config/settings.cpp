@@ -13,7 +13,6 @@
 #include "hub/config/toml_file.hpp"
 #include "hub/version.hpp"
 #include "proto/control/names.hpp"
-#include "proto/frame/frame_header.hpp"
 
 namespace gimnet::hub {
 namespace {
@@ -221,20 +220,9 @@ void apply_limit(Configuration& configuration, const Given& given, std::string_v
   faults.push_back(value_fault(given, std::move(error)));
 }
 
-/// WATCH_EVENTS that may wait for one node: of each watch a window, of all a window per node, but
-/// one of each watch in any case (Watches::is_idle).
-std::uint64_t watch_frames_most(const Limits& limits) {
-  const std::uint64_t watches = std::min(limits.watches_per_node, limits.watches);
-  if (watches * limits.watch_window <= limits.watch_window_per_node)
-    return watches * limits.watch_window;
-  const std::uint64_t full =
-      (limits.watch_window_per_node + limits.watch_window - 1) / limits.watch_window;
-  return limits.watch_window_per_node + watches - std::min(full, watches);
-}
-
 void keep_origin(Configuration& configuration, const Given& given) {
   configuration.origins[given.key] = given.origin;
-  configuration.places[given.key] = {given.value.place, given.label};
+  configuration.places[given.key] = given.value.place;
 }
 
 std::string origin_of(const Configuration& configuration, const std::string& key) {
@@ -243,6 +231,13 @@ std::string origin_of(const Configuration& configuration, const std::string& key
 }
 
 }  // namespace
+
+std::string place_of_either(const Configuration& configuration, const char* key,
+                            const char* other) {
+  auto where = configuration.places.find(key);
+  if (where == configuration.places.end()) where = configuration.places.find(other);
+  return where == configuration.places.end() ? "" : where->second;
+}
 
 std::size_t default_shards() {
   cpu_set_t set;
@@ -288,34 +283,12 @@ void complete(Configuration& configuration, Faults& faults) {
   complete_links(configuration, faults);
   const Limits& limits = options.limits;
   if (limits.silent_ms <= limits.keep_alive_ms) {
-    auto where = configuration.places.find("limits.silent_ms");
-    if (where == configuration.places.end())
-      where = configuration.places.find("limits.keep_alive_ms");
-    faults.push_back({where == configuration.places.end() ? "" : where->second.place,
+    faults.push_back({place_of_either(configuration, "limits.silent_ms", "limits.keep_alive_ms"),
                       "limit silent_ms (" + std::to_string(limits.silent_ms) +
                           ") must be larger than keep_alive_ms (" +
                           std::to_string(limits.keep_alive_ms) +
                           "), or healthy nodes are closed as silent"});
   }
-}
-
-Faults warnings_about(const Configuration& configuration) {
-  const Limits& limits = configuration.options.limits;
-  const std::uint64_t frames = watch_frames_most(limits);
-  const std::uint64_t bytes = frames * (proto::kHeaderSize + limits.watch_event_bytes);
-  if (bytes <= limits.control_bytes) return {};
-  std::string place;
-  for (const char* key : {"control_bytes", "watches_per_node"}) {
-    const auto where = configuration.places.find(std::string{kLimits} + key);
-    if (where != configuration.places.end() && place.empty()) place = where->second.place;
-  }
-  return {{place, "the watches of one node may have " + std::to_string(frames) +
-                      " WATCH_EVENTS of " + std::to_string(limits.watch_event_bytes) +
-                      " bytes waiting for it, " + std::to_string(bytes) +
-                      " bytes with their headers, and limit control_bytes (" +
-                      std::to_string(limits.control_bytes) +
-                      ") has a node sent away for more than that: make control_bytes " +
-                      std::to_string(bytes) + " or more, or watches_per_node smaller"}};
 }
 
 std::string print(const Configuration& configuration) {

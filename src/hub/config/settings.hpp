@@ -53,9 +53,9 @@ struct Configuration {
   std::map<std::string, std::string, std::less<>> origins;
   /// One for each of options.listen, for what can only be judged when all is known.
   std::vector<Fault> listen_places;
-  std::vector<std::string> link_places;              ///< the same of options.links.dial
-  std::string proxy{};                               ///< GIMNET_PROXY, for links that name none
-  std::map<std::string, Fault, std::less<>> places;  ///< as `origins`; the sentence is the label
+  std::vector<std::string> link_places;  ///< the same of options.links.dial
+  std::string proxy{};                   ///< GIMNET_PROXY, for links that name none
+  std::map<std::string, std::string, std::less<>> places;  ///< as `origins`, for faults
 };
 
 /// A key outside [limits]: "shards", "links.allow".
@@ -78,9 +78,9 @@ void apply(Configuration& configuration, const Given& given, Faults& faults);
 /// Fills in what follows from other values, and looks at what must agree. To be called last.
 void complete(Configuration& configuration, Faults& faults);
 
-/// What a hub of that configuration runs with, but may not do what it is told to: with numbers, and
-/// what to do. REQUIRES: complete() was called.
-[[nodiscard]] Faults warnings_about(const Configuration& configuration);
+/// The place of the first of two keys that is set; "": none of them.
+[[nodiscard]] std::string place_of_either(const Configuration& configuration, const char* key,
+                                          const char* other);
 
 /// The whole configuration as TOML, each value with where it came from.
 [[nodiscard]] std::string print(const Configuration& configuration);

@@ -11,7 +11,6 @@
 #include <cerrno>
 #include <cstdlib>
 #include <filesystem>
-#include <iterator>
 #include <string_view>
 #include <system_error>
 #include <utility>
@@ -28,18 +27,17 @@ constexpr const char* kGivePath =
     "give the path of a TOML file with --config, or, in conf.d, take it away";
 
 ConfigText no_text(int code) {
-  const std::error_code error{code, std::generic_category()};
-  const bool denied = error == std::errc::permission_denied;
-  return {{},
-          error.message() +
-              remedy_of(error, denied ? "give the user that runs tcphub the right to read it"
-                                      : kGivePath)};
+  const char* remedy = kGivePath;
+  if (code == EACCES) remedy = "give the user that runs tcphub the right to read it";
+  if (code == EMFILE) remedy = "raise the limit on descriptors (ulimit -n), or let a node go";
+  return {{}, std::generic_category().message(code) + "; " + remedy};
 }
 
-/// What stands there instead of a file, or "".
+/// The kind of thing that stands there instead of a file, or "".
 std::string instead_of_file(const struct stat& info, bool pipes) {
   const std::string remedy = std::string{"; "} + kGivePath;
-  if (S_ISREG(info.st_mode) || (pipes && S_ISFIFO(info.st_mode))) return {};
+  if (S_ISREG(info.st_mode)) return {};
+  if (S_ISFIFO(info.st_mode) && pipes) return {};
   if (S_ISDIR(info.st_mode)) return "it is a folder" + remedy;
   if (S_ISSOCK(info.st_mode)) return "it is a socket" + remedy;
   if (S_ISFIFO(info.st_mode)) {
@@ -67,14 +65,6 @@ int read_whole(int descriptor, std::string& text) {
 }
 
 }  // namespace
-
-std::string remedy_of(const std::error_code& error, const std::string& otherwise) {
-  const bool shortage =
-      error == std::errc::too_many_files_open || error == std::errc::too_many_files_open_in_system;
-  if (!shortage) return "; " + otherwise;
-  return "; there is no descriptor left to read it with: raise the limit (ulimit -n) or let a node "
-         "go, then try again";
-}
 
 ConfigText read_config_text(const std::string& path, bool pipes) {
   struct stat info{};
@@ -162,26 +152,16 @@ Given from_environment(const std::string& variable, const std::string& key, std:
   return given;
 }
 
-void read_one(const std::string& path, const ReadOptions& how, ReadConfiguration& read) {
-  if (read.more_faults) return;
-  const ConfigText file = read_config_text(path, how.pipes);
+void read_one(const std::string& path, bool pipes, ReadConfiguration& read) {
+  const ConfigText file = read_config_text(path, pipes);
   read.files.push_back(path);
   if (!file.error.empty()) {
     read.faults.push_back({path, "cannot read this file: " + file.error});
     return;
   }
-  // One more than is told, to know whether there are more. Keys come in the order of the file.
-  const std::size_t most = how.faults_max - std::min(how.faults_max, read.faults.size());
-  TomlFile toml = read_toml(file.text, path);
-  Faults faults = std::move(toml.faults);
-  for (const Given& given : toml.keys) {
-    if (faults.size() > most) break;
-    apply(read.configuration, given, faults);
-  }
-  read.more_faults = faults.size() > most;
-  if (read.more_faults) faults.resize(most);
-  read.faults.insert(read.faults.end(), std::move_iterator(faults.begin()),
-                     std::move_iterator(faults.end()));
+  const TomlFile toml = read_toml(file.text, path);
+  read.faults.insert(read.faults.end(), toml.faults.begin(), toml.faults.end());
+  for (const Given& given : toml.keys) apply(read.configuration, given, read.faults);
 }
 
 /// The *.toml of the folder, by name.
@@ -202,10 +182,9 @@ std::vector<std::string> files_in(const fs::path& folder, Faults& faults) {
     const bool hidden = entry->path().filename().native().starts_with('.');
     if (entry->path().extension() == ".toml" && !hidden) files.push_back(entry->path().string());
   }
-  if (error) {
-    faults.push_back({folder.string(), "cannot read this folder: " + error.message() +
-                                           remedy_of(error, "give it rights")});
-  }
+  if (error)
+    faults.push_back(
+        {folder.string(), "cannot read this folder: " + error.message() + "; give it rights"});
   std::ranges::sort(files);
   if (files.size() > kConfigFilesMax) {
     faults.push_back({folder.string(), "there are " + std::to_string(files.size()) +
@@ -274,7 +253,7 @@ std::vector<std::string> read_environment(ConfigSources& sources, const char* co
   return warnings;
 }
 
-ReadConfiguration read_configuration(const ConfigSources& sources, const ReadOptions& how) {
+ReadConfiguration read_configuration(const ConfigSources& sources, bool pipes) {
   ReadConfiguration read;
   read.faults = sources.faults;
   read.configuration.options.shards = default_shards();
@@ -290,16 +269,13 @@ ReadConfiguration read_configuration(const ConfigSources& sources, const ReadOpt
     const bool any_parts = !parts.empty() || !of_folder.empty();
     read.place.parts_alone =
         read.place.parts_alone && any_parts && !fs::exists(read.place.file, ignored);
-    if (!read.place.parts_alone) read_one(read.place.file, how, read);
+    if (!read.place.parts_alone) read_one(read.place.file, pipes, read);
     read.faults.insert(read.faults.end(), of_folder.begin(), of_folder.end());
-    ReadOptions only_files = how;
-    only_files.pipes = false;
-    for (const std::string& part : parts) read_one(part, only_files, read);
+    for (const std::string& part : parts) read_one(part, false, read);
   }
   for (const Given& given : sources.environment) apply(read.configuration, given, read.faults);
   for (const Given& given : sources.flags) apply(read.configuration, given, read.faults);
   complete(read.configuration, read.faults);
-  if (read.faults.empty()) read.warnings = warnings_about(read.configuration);
   return read;
 }
 

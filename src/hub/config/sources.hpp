@@ -1,9 +1,7 @@
 #pragma once
 
 #include <cstddef>
-#include <optional>
 #include <string>
-#include <system_error>
 #include <vector>
 
 #include "hub/config/settings.hpp"
@@ -22,9 +20,6 @@ struct ConfigText {
 /// pipe is one unless `pipes`; it is then read to its end, however long that takes, and must not be
 /// empty: a command that failed must not leave a hub with its defaults. Thread safety: any thread.
 [[nodiscard]] ConfigText read_config_text(const std::string& path, bool pipes);
-
-/// What to do about an error: `otherwise` where it is not that the process has no descriptor left.
-[[nodiscard]] std::string remedy_of(const std::error_code& error, const std::string& otherwise);
 
 /// Most files in a conf.d.
 inline constexpr std::size_t kConfigFilesMax = 256;
@@ -47,18 +42,10 @@ struct ConfigPlace {
   bool parts_alone = false;  ///< as ConfigSources::parts_alone
 };
 
-/// How to read.
-struct ReadOptions {
-  std::size_t faults_max = kConfigFaultsMax;  ///< told of the files
-  bool pipes = false;  ///< the file may be a pipe, which can be read only once
-};
-
 /// What was read.
 struct ReadConfiguration {
   Configuration configuration;  ///< whole only where there are no faults
   Faults faults;
-  bool more_faults = false;        ///< there are more than were asked for
-  Faults warnings;                 ///< none where there are faults
   std::vector<std::string> files;  ///< that were read, the one beside conf.d first
   ConfigPlace place;               ///< to be read again
 };
@@ -71,10 +58,11 @@ struct ReadConfiguration {
 [[nodiscard]] std::vector<std::string> read_environment(ConfigSources& sources,
                                                         const char* const* environment);
 
-/// Reads everything. Errors are faults: a file that is named and not there, or cannot be read, or
-/// is no regular file, is one. Thread safety: any thread. Limits: kConfigFilesMax files of
-/// kConfigBytesMax each. Blocks no longer than the disk, or the writer of a pipe, does.
+/// Reads everything; the file may be a pipe if `pipes`. Errors are faults: a file that is named and
+/// not there, or cannot be read, or is no regular file, is one. Thread safety: any thread. Limits:
+/// kConfigFilesMax files of kConfigBytesMax each. Blocks no longer than the disk, or the writer of
+/// a pipe, does.
 [[nodiscard]] ReadConfiguration read_configuration(const ConfigSources& sources,
-                                                   const ReadOptions& how = {});
+                                                   bool pipes = false);
 
 }  // namespace gimnet::hub

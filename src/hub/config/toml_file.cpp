@@ -112,22 +112,13 @@ std::string text_of(const Node& node) {
 }
 
 ConfigValue::Kind kind_of(const toml::node& node) {
-  switch (node.type()) {
-    case toml::node_type::string:
-      return ConfigValue::Kind::text;
-    case toml::node_type::integer:
-      return ConfigValue::Kind::integer;
-    case toml::node_type::boolean:
-      return ConfigValue::Kind::boolean;
-    case toml::node_type::floating_point:
-      return ConfigValue::Kind::fraction;
-    case toml::node_type::array:
-      return ConfigValue::Kind::list;
-    case toml::node_type::table:
-      return ConfigValue::Kind::table;
-    default:
-      return ConfigValue::Kind::time;
-  }
+  using Kind = ConfigValue::Kind;
+  if (node.is_string()) return Kind::text;
+  if (node.is_integer()) return Kind::integer;
+  if (node.is_boolean()) return Kind::boolean;
+  if (node.is_floating_point()) return Kind::fraction;
+  if (node.is_array()) return Kind::list;
+  return node.is_table() ? Kind::table : Kind::time;
 }
 
 /// Lists within tables within a list: [[link]] with its `allow`. Deeper ones are wrong whatever is

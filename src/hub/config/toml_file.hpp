@@ -11,9 +11,6 @@ namespace gimnet::hub {
 
 /// Most bytes of one configuration file.
 inline constexpr std::size_t kConfigBytesMax = std::size_t{1} << 20;
-/// Most faults that are told at once: more than one file can have, which is one for every two of
-/// its bytes.
-inline constexpr std::size_t kConfigFaultsMax = 1'000'000;
 
 /// What a configuration file says, or why it cannot be read.
 struct TomlFile {

@@ -250,17 +250,6 @@ TEST(Options, ChecksTheConfigurationAndEnds) {
                             ":2:10: hub_id is a whole number, not a text: write hub_id = 1\n");
 }
 
-TEST(Options, WarnsOfLimitsThatDoNotFitTogether) {
-  const std::vector<const char*> arguments{"--limit", "watch_event_bytes=64k"};
-  const auto parsed = parse(arguments);
-  ASSERT_EQ(std::get<CommandLine>(parsed).warnings.size(), 1u);
-  EXPECT_THAT(std::get<CommandLine>(parsed).warnings[0],
-              ::testing::StartsWith("the watches of one node may have 25"));
-  const CommandLineEnding checked = ending({"--limit", "watch_event_bytes=64k", "--check-config"});
-  EXPECT_EQ(checked.exit_code, 0);
-  EXPECT_THAT(checked.text, ::testing::StartsWith("warning: the watches of one node may have 25"));
-}
-
 TEST(Options, PrintsTheConfigurationAndEnds) {
   const CommandLineEnding printed = ending({"--print-config", "--hub-id", "9"});
   EXPECT_EQ(printed.exit_code, 0);

@@ -28,13 +28,6 @@ Read read(const std::string& text) {
   return result;
 }
 
-/// What a hub with those limits warns of.
-Faults warnings(const std::string& limits) {
-  const Read result = read("[limits]\n" + limits);
-  EXPECT_THAT(result.faults, IsEmpty()) << limits;
-  return warnings_about(result.configuration);
-}
-
 /// The only thing that is wrong with `text`.
 std::string fault(const std::string& text) {
   const Read result = read(text);
@@ -194,24 +187,6 @@ TEST(Settings, WhatIsPrintedIsReadBackEqual) {
 TEST(Settings, DefaultShardsAreBounded) {
   EXPECT_GE(default_shards(), 1u);
   EXPECT_LE(default_shards(), 8u);
-}
-
-TEST(Settings, WatchesThatMayTakeMoreThanControlBytesAreWarnedOf) {
-  EXPECT_THAT(warnings(""), IsEmpty());
-  // 12 frames in 3 windows, and one of each of the 13 other watches.
-  EXPECT_THAT(warnings("control_bytes = 256400"), IsEmpty());
-  ASSERT_THAT(warnings("control_bytes = 256399"), SizeIs(1));
-  EXPECT_THAT(warnings("control_bytes = 256399")[0].text(),
-              AllOf(HasSubstr("f:2:17: "), HasSubstr("25 WATCH_EVENTS of 10240 bytes"),
-                    HasSubstr("256400 bytes"), HasSubstr("control_bytes (256399)"),
-                    HasSubstr("make control_bytes 256400 or more")));
-  // Every watch has one frame in any case; with few watches their windows are all there is; none
-  // take nothing.
-  EXPECT_THAT(warnings("watches_per_node = 17\ncontrol_bytes = 266656"), IsEmpty());
-  EXPECT_THAT(warnings("watches_per_node = 17\ncontrol_bytes = 266655"), SizeIs(1));
-  EXPECT_THAT(warnings("watches_per_node = 2\ncontrol_bytes = 82048"), IsEmpty());
-  EXPECT_THAT(warnings("watches_per_node = 2\ncontrol_bytes = 82047"), SizeIs(1));
-  EXPECT_THAT(warnings("watches_per_node = 0\ncontrol_bytes = 16384"), IsEmpty());
 }
 
 }  // namespace
