@@ -8,7 +8,6 @@ namespace gimnet::demo {
 namespace {
 
 constexpr char kEscape = '\x1b';
-constexpr std::size_t kSequenceMax = 32;
 
 struct Meaning {
   std::string_view bytes;  // each of which means it
@@ -32,58 +31,38 @@ std::optional<Key> key_in(std::span<const Meaning> meanings, char byte) {
   return std::nullopt;
 }
 
-// The sequence at the front of a text that begins with Esc. Size 0: its end is still to come.
-struct Sequence {
-  std::size_t size = 0;
-  bool whole = false;
-};
-
-// CSI and SS3 (ECMA-48, 5.4 and 8.3.143). A control character is in none of them: it is a key of
-// its own, as is what stands behind an Esc that begins neither.
-Sequence sequence_at_front(std::string_view text) {
-  if (text.size() < 2) return {};
-  if (text[1] != '[' && text[1] != 'O') return {1, false};
+// Bytes of the sequence at the front of a text that begins with Esc: CSI or SS3 (ECMA-48, 5.4 and
+// 8.3.143). A control character is in none of them: it is a key of its own, as is what stands
+// behind an Esc that begins neither.
+std::size_t sequence_size(std::string_view text) {
+  if (text.size() < 2 || (text[1] != '[' && text[1] != 'O')) return 1;
   for (std::size_t index = 2; index < text.size(); ++index) {
     const char byte = text[index];
-    if (byte < ' ' || byte > '~') return {index, false};
+    if (byte < ' ' || byte > '~') return index;
     // F1 to F5 of the Linux console: ESC [ [ A.
     const bool second_bracket = text[1] == '[' && index == 2 && byte == '[';
-    if (text[1] == 'O' || (byte >= '@' && !second_bracket)) return {index + 1, true};
-    if (index + 1 == kSequenceMax) return {index + 1, false};
+    if (text[1] == 'O' || (byte >= '@' && !second_bracket)) return index + 1;
   }
-  return {};
+  return text.size();
 }
 
 std::optional<Key> key_of_sequence(std::string_view sequence) {
-  return sequence[2] == '[' ? std::nullopt : key_in(kArrows, sequence.back());
+  if (sequence.size() < 3 || sequence[2] == '[') return std::nullopt;
+  return key_in(kArrows, sequence.back());
 }
 
 }  // namespace
 
-std::vector<Key> KeyParser::take(std::string_view bytes, std::int64_t now_ns) {
-  if (!bytes.empty()) {
-    pending_since_ns_ = now_ns;
-  } else if (now_ns - pending_since_ns_ >= kSequencePatience_ns) {
-    pending_.clear();
-  }
-  pending_.append(bytes);
+std::vector<Key> keys_in(std::string_view bytes) {
   std::vector<Key> keys;
-  std::string_view rest = pending_;
-  while (!rest.empty()) {
-    if (rest.front() != kEscape) {
-      if (const std::optional<Key> key = key_in(kMeanings, rest.front())) keys.push_back(*key);
-      rest.remove_prefix(1);
-      continue;
-    }
-    const Sequence sequence = sequence_at_front(rest);
-    if (sequence.size == 0) break;
-    if (sequence.whole) {
-      if (const std::optional<Key> key = key_of_sequence(rest.substr(0, sequence.size)))
-        keys.push_back(*key);
-    }
-    rest.remove_prefix(sequence.size);
+  while (!bytes.empty()) {
+    const bool escape = bytes.front() == kEscape;
+    const std::size_t size = escape ? sequence_size(bytes) : 1;
+    const std::optional<Key> key =
+        escape ? key_of_sequence(bytes.substr(0, size)) : key_in(kMeanings, bytes.front());
+    if (key) keys.push_back(*key);
+    bytes.remove_prefix(size);
   }
-  pending_ = std::string(rest);
   return keys;
 }
 

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <string>
 #include <string_view>
 #include <vector>
 
@@ -29,24 +28,10 @@ enum class Key : std::uint8_t {
   kQuit,
 };
 
-/// Turns the bytes of a terminal into keys: letters in either case, arrows, Ctrl-C and Ctrl-L. A
-/// sequence that was cut waits for its rest; unknown ones are skipped whole. Esc alone means
-/// nothing, and swallows nothing but what makes a sequence of it within `kSequencePatience_ns`.
-/// Thread safety: one thread.
-class KeyParser {
- public:
-  /// A terminal writes a sequence at once, and a network delivers it in pieces at worst; nobody
-  /// types that fast.
-  static constexpr std::int64_t kSequencePatience_ns = 100'000'000;
-
-  /// Takes the bytes since the last call. Call it without bytes too: so it learns that no more of a
-  /// sequence comes. Times are of any clock that does not go back.
-  [[nodiscard]] std::vector<Key> take(std::string_view bytes, std::int64_t now_ns);
-
- private:
-  std::string pending_;
-  std::int64_t pending_since_ns_ = 0;
-};
+/// The keys in the bytes of a terminal: letters in either case, arrows, Ctrl-C and Ctrl-L.
+/// Sequences that mean nothing here are skipped whole, and so is Esc alone. Thread safety: pure
+/// function.
+[[nodiscard]] std::vector<Key> keys_in(std::string_view bytes);
 
 /// Turns keys into a wanted speed. A terminal tells that a key goes down and repeats, never that it
 /// goes up: a key holds for a while and then lets go, long enough to bridge the pause before the

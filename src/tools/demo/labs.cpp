@@ -53,32 +53,17 @@ struct Places {
   const TemporaryFolder& folder;
 };
 
-Result<LabHub> start_hub(const Places& places, const std::string& name, int id,
-                         const std::vector<std::string>& more) {
-  std::vector<std::string> words{places.programs + "/tcphub",
-                                 "--listen",
-                                 "tcp://127.0.0.1:0",
-                                 "--listen",
-                                 "unix:" + (places.folder / (name + ".sock")),
-                                 "--state-dir",
-                                 places.folder / name,
-                                 "--hub-name",
-                                 name,
-                                 "--hub-id",
-                                 std::to_string(id)};
-  words.insert(words.end(), more.begin(), more.end());
-  Result<ChildProcess> process =
-      ChildProcess::start({"the hub " + name, words, places.folder / (name + ".log")});
-  if (!process) return process.error();
-  const Result<std::string> ready = process->read_line(kReady_ns);
-  if (!ready) return ready.error();
-  const Result<HubAddresses> at = parse_ready_line(*ready);
-  if (!at) return at.error();
+Result<LabHub> start_lab_hub(const Places& places, const std::string& name, int id,
+                             const std::vector<std::string>& more) {
+  HubWish wish{"the hub " + name, name, {"--hub-name", name, "--hub-id", std::to_string(id)}};
+  wish.more.insert(wish.more.end(), more.begin(), more.end());
+  Result<HubProcess> hub = start_hub(places.programs, places.folder, wish);
+  if (!hub) return hub.error();
   NodeOptions joining;
-  joining.hub = at->unix_socket;
+  joining.hub = hub->at.unix_socket;
   Outcome<Node> node = Node::join(joining);
   if (!node) return Error{node.failure().sentence};
-  return LabHub{name, std::move(*process), *at, std::move(*node)};
+  return LabHub{name, std::move(hub->process), hub->at, std::move(*node)};
 }
 
 Result<ChildProcess> start_machine(const Places& places, const std::string& name,
@@ -246,7 +231,7 @@ class Labs {
 
 std::optional<Error> Labs::start_hubs(const Places& places) {
   hubs_.reserve(3);
-  Result<LabHub> north = start_hub(places, "north", 1, {"--accept-links"});
+  Result<LabHub> north = start_lab_hub(places, "north", 1, {"--accept-links"});
   if (!north) return north.error();
   impair::Impairment how;
   how.delay_ns = kWanDelay_ns;
@@ -258,7 +243,7 @@ std::optional<Error> Labs::start_hubs(const Places& places) {
   hubs_.push_back(std::move(*north));
   for (const auto& [name, link] : {std::pair{"south", wan_->url()}, {"rover", near}}) {
     const int id = static_cast<int>(hubs_.size()) + 1;
-    Result<LabHub> hub = start_hub(places, name, id, {"--link", link});
+    Result<LabHub> hub = start_lab_hub(places, name, id, {"--link", link});
     if (!hub) return hub.error();
     hubs_.push_back(std::move(*hub));
   }

@@ -65,14 +65,13 @@ Result<Robot::SourceMaker> source_maker(const DemoOptions& options) {
   });
 }
 
-// The style of the screen: by choice of the user, then the environment, then the terminal itself.
-TerminalStyle style_for(const DemoOptions& options, Terminal* terminal) {
+// The style of the screen: by choice of the user, or of the environment. A terminal of which that
+// does not tell the encoding reads UTF-8.
+TerminalStyle style_for(const DemoOptions& options, const Terminal* terminal) {
   TerminalStyle style;
   style.colours = terminal == nullptr ? ColourDepth::kNone : colours_of_environment();
-  std::optional<bool> utf8 = utf8_of_environment();
-  if (!utf8 && terminal != nullptr) utf8 = terminal->understands_utf8();
-  if (options.glyphs != Glyphs::kAuto) utf8 = options.glyphs == Glyphs::kUtf8;
-  style.utf8 = utf8.value_or(false);
+  style.utf8 = options.glyphs == Glyphs::kAuto ? utf8_of_environment().value_or(terminal != nullptr)
+                                               : options.glyphs == Glyphs::kUtf8;
   return style;
 }
 

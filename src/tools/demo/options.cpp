@@ -33,7 +33,7 @@ Starts a hub of its own, and the robot as a separate process. For your own hub, 
   --seconds N      ends after N seconds
   --hub URL        tcp://host:port or unix:/path; also from GIMNET_HUB
   --robot NAME     the robot's name in the network (robot)
-  --ascii, --utf8  which characters to draw with; found out by default
+  --ascii, --utf8  which characters to draw with; by default as the environment says
   --help           this text
 
 NO_COLOR turns colours off. While it runs, ? shows the keys.

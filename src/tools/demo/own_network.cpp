@@ -185,7 +185,7 @@ void TemporaryFolder::Remover::operator()(const std::string* path) const {
 
 namespace {
 
-constexpr std::int64_t kReady_ns = 10'000'000'000;
+constexpr std::int64_t kReady_ns = 15'000'000'000;
 
 std::vector<std::string> robot_words(const DemoOptions& options, const std::string& program,
                                      const std::string& hub_url) {
@@ -216,6 +216,26 @@ Result<HubAddresses> parse_ready_line(const std::string& line) {
   return addresses;
 }
 
+Result<HubProcess> start_hub(const std::string& programs, const TemporaryFolder& folder,
+                             const HubWish& wish) {
+  std::vector<std::string> words{programs + "/tcphub",
+                                 "--listen",
+                                 "tcp://127.0.0.1:0",
+                                 "--listen",
+                                 "unix:" + (folder / (wish.name + ".sock")),
+                                 "--state-dir",
+                                 folder / wish.name};
+  words.insert(words.end(), wish.more.begin(), wish.more.end());
+  Result<ChildProcess> process =
+      ChildProcess::start({wish.title, words, folder / (wish.name + ".log")});
+  if (!process) return process.error();
+  const Result<std::string> ready = process->read_line(kReady_ns);
+  if (!ready) return ready.error();
+  const Result<HubAddresses> at = parse_ready_line(*ready);
+  if (!at) return at.error();
+  return HubProcess{std::move(*process), *at};
+}
+
 std::string folder_of_this_program() {
   std::error_code error;
   const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", error);
@@ -226,24 +246,13 @@ Result<OwnNetwork> OwnNetwork::start(const DemoOptions& options,
                                      const std::string& folder_of_programs) {
   Result<TemporaryFolder> folder = TemporaryFolder::make();
   if (!folder) return folder.error();
-  const std::string hub_log = *folder / "tcphub.log";
-  Result<ChildProcess> hub = ChildProcess::start(
-      {"the hub",
-       {folder_of_programs + "/tcphub", "--listen", "tcp://127.0.0.1:0", "--listen",
-        "unix:" + (*folder / "hub.sock"), "--state-dir", *folder / "state"},
-       hub_log});
+  Result<HubProcess> hub = start_hub(folder_of_programs, *folder, {"the hub", "hub"});
   if (!hub) return hub.error();
-  const Result<std::string> ready = hub->read_line(kReady_ns);
-  if (!ready) return ready.error();
-  const Result<HubAddresses> addresses = parse_ready_line(*ready);
-  if (!addresses) return addresses.error();
-
   const std::string robot_log = *folder / "robot.log";
-  OwnNetwork network(std::move(*folder), std::move(*hub));
-  network.hub_url_ = addresses->tcp;
+  OwnNetwork network(std::move(*folder), std::move(hub->process));
+  network.hub_url_ = hub->at.tcp;
   Result<ChildProcess> robot = ChildProcess::start(
-      {"the robot",
-       robot_words(options, folder_of_programs + "/gimnet-demo", addresses->unix_socket),
+      {"the robot", robot_words(options, folder_of_programs + "/gimnet-demo", hub->at.unix_socket),
        robot_log});
   if (!robot) return robot.error();
   network.robot_.emplace(std::move(*robot));

@@ -93,6 +93,29 @@ class TemporaryFolder {
   std::unique_ptr<const std::string, Remover> path_;
 };
 
+/// The addresses in the line `ready URL URL` of a hub. Errors: another line.
+struct HubAddresses {
+  std::string tcp;
+  std::string unix_socket;
+};
+[[nodiscard]] Result<HubAddresses> parse_ready_line(const std::string& line);
+
+/// A hub that says that it is ready.
+struct HubProcess {
+  ChildProcess process;
+  HubAddresses at;
+};
+/// Its files are `folder/NAME...`; `more` are further arguments.
+struct HubWish {
+  std::string title;
+  std::string name;
+  std::vector<std::string> more{};
+};
+/// Starts `programs`/tcphub on a free port and a Unix socket. Errors: it is missing, does not
+/// start, or does not say that it is ready.
+[[nodiscard]] Result<HubProcess> start_hub(const std::string& programs,
+                                           const TemporaryFolder& folder, const HubWish& wish);
+
 /// The demo's own hub and robot, each a process, with their files in a temporary folder. Ends them,
 /// the robot first, when it goes. Thread safety: one thread.
 class OwnNetwork {
@@ -120,13 +143,6 @@ class OwnNetwork {
   std::optional<ChildProcess> robot_;
   std::string hub_url_;
 };
-
-/// The addresses in the line `ready URL URL` of a hub. Errors: another line.
-struct HubAddresses {
-  std::string tcp;
-  std::string unix_socket;
-};
-[[nodiscard]] Result<HubAddresses> parse_ready_line(const std::string& line);
 
 /// The folder in which this program lies.
 [[nodiscard]] std::string folder_of_this_program();

@@ -8,13 +8,9 @@
 #include <algorithm>
 #include <cctype>
 #include <cerrno>
-#include <csignal>
 #include <cstdlib>
 #include <iterator>
 #include <string_view>
-
-#include "base/check.hpp"
-#include "base/clock.hpp"
 
 namespace gimnet::demo {
 namespace {
@@ -139,43 +135,10 @@ namespace {
 
 constexpr std::string_view kEnter = "\x1b[?1049h\x1b[?25l\x1b[?7l\x1b[2J";
 constexpr std::string_view kLeave = "\x1b[0m\x1b[?7h\x1b[?25h\x1b[?1049l";
-constexpr int kCrashes[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT};
-
-// For the crash handler, which can ask nobody.
-struct Taken {
-  volatile std::sig_atomic_t active = 0;
-  Terminal::Ends ends = {};
-  termios before = {};
-};
-constinit Taken taken;
-
-// Only calls that POSIX allows in a signal handler.
-extern "C" void restore_and_crash(int signal) {
-  if (taken.active != 0) {
-    taken.active = 0;
-    (void)!::write(taken.ends.screen, kLeave.data(), kLeave.size());
-    (void)::tcsetattr(taken.ends.keyboard, TCSANOW, &taken.before);
-  }
-  (void)::raise(signal);
-}
-
-void on_crash(void (*handler)(int)) {
-  struct sigaction action{};
-  action.sa_handler = handler;
-  // The second raise, within the handler, ends the process as without one.
-  action.sa_flags = static_cast<int>(SA_RESETHAND | SA_NODEFER);
-  sigemptyset(&action.sa_mask);
-  for (const int signal : kCrashes) ::sigaction(signal, &action, nullptr);
-}
 
 std::string environment(const char* name) {
   const char* value = std::getenv(name);
   return value == nullptr ? "" : value;
-}
-
-bool wait_readable(int descriptor, int wait_ms) {
-  pollfd waiting{descriptor, POLLIN, 0};
-  return ::poll(&waiting, 1, wait_ms) > 0;
 }
 
 }  // namespace
@@ -186,11 +149,6 @@ std::unique_ptr<Terminal> Terminal::open(const Ends& ends) {
   if (::isatty(ends.keyboard) != 1 || ::isatty(ends.screen) != 1) return nullptr;
   termios before{};
   if (::tcgetattr(ends.keyboard, &before) != 0) return nullptr;
-  GIMNET_CHECK(taken.active == 0);
-  taken.ends = ends;
-  taken.before = before;
-  taken.active = 1;
-  on_crash(restore_and_crash);
   termios raw = before;
   // Signals off as well: Ctrl-C is a key, so that it is not lost between two programs of the
   // foreground.
@@ -207,8 +165,6 @@ std::unique_ptr<Terminal> Terminal::open(const Ends& ends) {
 Terminal::~Terminal() {
   write(kLeave);
   (void)::tcsetattr(ends_.keyboard, TCSAFLUSH, &before_);
-  taken.active = 0;
-  on_crash(SIG_DFL);
 }
 
 Extent Terminal::extent() const {
@@ -240,27 +196,6 @@ void Terminal::write(std::string_view bytes) {
       return;
     }
   }
-}
-
-std::optional<bool> Terminal::understands_utf8() {
-  write("\x1b[1;1H\xe2\xa3\xbf\x1b[6n");
-  constexpr std::int64_t kPatience_ns = 300'000'000;
-  const std::int64_t until_ns = steady_now_ns() + kPatience_ns;
-  std::string answer;
-  while (answer.find('R') == std::string::npos) {
-    const std::int64_t left_ns = until_ns - steady_now_ns();
-    if (left_ns <= 0 || answer.size() > 64) return std::nullopt;
-    if (!wait_readable(ends_.keyboard, static_cast<int>(left_ns / 1'000'000) + 1))
-      return std::nullopt;
-    std::string more;
-    if (!read(more)) return std::nullopt;
-    answer += more;
-  }
-  write("\x1b[2J");
-  // The answer is ESC [ row ; column R.
-  const std::size_t separator = answer.rfind(';');
-  if (separator == std::string::npos) return std::nullopt;
-  return answer.compare(separator + 1, 2, "2R") == 0;
 }
 
 ColourDepth colours_of_environment() {

@@ -50,8 +50,8 @@ class AnsiWriter {
 [[nodiscard]] char ascii_for(const Glyph& glyph);
 
 /// The terminal of this process, taken over: keys come at once and unseen, the screen is a second
-/// one, the cursor is hidden. All of that is undone when the object goes, and also when the process
-/// crashes. Thread safety: one thread. Limits: one object at a time.
+/// one, the cursor is hidden. All of that is undone when the object goes. Thread safety: one
+/// thread.
 class Terminal {
  public:
   /// The descriptors of keyboard and screen.
@@ -76,10 +76,6 @@ class Terminal {
 
   /// Writes all of it. The rest is lost where the terminal is gone.
   void write(std::string_view bytes);
-
-  /// Asks the terminal itself whether it reads UTF-8: shows a character of three bytes and asks
-  /// where the cursor is now. Waits for the answer at most 300 ms; nothing if none comes.
-  [[nodiscard]] std::optional<bool> understands_utf8();
 
  private:
   Terminal(const Ends& ends, const termios& before) : ends_(ends), before_(before) {}

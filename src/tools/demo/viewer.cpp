@@ -75,7 +75,7 @@ void Viewer::take_keys(std::int64_t now_ns) {
   if (terminal_ == nullptr) return;
   std::string bytes;
   if (!terminal_->read(bytes)) quit_ = true;
-  for (const Key key : keys_.take(bytes, steady_now_ns())) press(key, now_ns);
+  for (const Key key : keys_in(bytes)) press(key, now_ns);
 }
 
 ScreenState Viewer::screen_state(std::int64_t now_ns) const {

@@ -77,7 +77,6 @@ class Viewer {
   ViewerOptions options_;
   Monitor monitor_;
   Driver driver_;
-  KeyParser keys_;
   AnsiWriter writer_;
   MapChoice map_;
   bool help_ = false;

@@ -91,15 +91,6 @@ TEST_F(TerminalTest, KnowsItsExtent) {
   EXPECT_EQ(terminal->extent(), (Extent{132, 43}));
 }
 
-TEST_F(TerminalTest, AsksWhetherItReadsUtf8) {
-  const std::unique_ptr<Terminal> terminal = open();
-  type("\x1b[1;2R");
-  EXPECT_EQ(terminal->understands_utf8(), true);
-  type("\x1b[1;4R");
-  EXPECT_EQ(terminal->understands_utf8(), false);
-  EXPECT_EQ(terminal->understands_utf8(), std::nullopt);
-}
-
 TEST_F(TerminalTest, IsNotTakenWhereItCanDoNothing) {
   ASSERT_EQ(::setenv("TERM", "dumb", 1), 0);
   EXPECT_EQ(open(), nullptr);
