@@ -64,7 +64,7 @@ def where_and_when(record: dict) -> str:
     machine = record["machine"]
     versions = "".join(f"; {name} {version}" for name, version in record.get("versions", {}).items())
     text = (f"{record['date']}; {machine['processor']}, {machine['cpus_allowed']} processors, {machine['system']}, Linux {machine['kernel']}; "
-            f"GIMnet {record.get('version', '')}{versions}; {record['runs']} to {max(record['runs'], record['runs_max'])} runs of {record['seconds']} s "
+            f"GIMnet {record.get('version', '')}{versions}; {record['runs']} runs of {record['seconds']} s "
             f"(of some scenarios longer); further arguments of the hub: {' '.join(record['hub_arguments']) or 'none'}.")
     return textwrap.fill(text, 100, break_long_words=False, break_on_hyphens=False)
 

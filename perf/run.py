@@ -29,9 +29,6 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 QUICK_SECONDS = 0.4
 WHOLE_SECONDS = 0.5
 RUNS = 3
-RUNS_MAX = 9  # of what lies far apart or decides nothing, as long as there is time:
-QUICK_EXTRA_SECONDS = 45
-WHOLE_EXTRA_SECONDS = 240
 SMOKE_CLIENTS = 200  # of scenarios with 10,000 or 1,000: in a smoke run it is not counted how long they take
 SMOKE_PATIENCE_SECONDS = 30
 SKIPPED = 77  # what ctest takes for a test that was left out
@@ -59,7 +56,7 @@ def parse_arguments(given: list[str] | None = None) -> argparse.Namespace:
                         help="16 to 1,048,576; others than those of the whole run, too")
     parser.add_argument("--transport", nargs="+", action="extend", choices=("tcp", "unix"), default=[])
     parser.add_argument("--seconds", type=usage.seconds, help="length of each measurement, 0.01 to 450; some scenarios take several times that")
-    parser.add_argument("--runs", type=usage.positive_whole, help="measurements of which the median is taken (3, and more where they decide nothing)")
+    parser.add_argument("--runs", type=usage.positive_whole, help="measurements of which the median is taken (3; 9 decide more)")
     parser.add_argument("--build-dir", type=pathlib.Path, default=ROOT / "build" / "release")
     parser.add_argument("--hub-argument", action="append", default=[], metavar="ARGUMENT",
                         help="one more word for the hub's command line, and another for the value of an option: "
@@ -120,8 +117,6 @@ def make_settings(arguments: argparse.Namespace) -> Settings:
     return Settings(build=arguments.build_dir, seconds=arguments.seconds or usual,
                     seconds_of=lengths(arguments),
                     runs=arguments.runs or (1 if arguments.smoke else RUNS),
-                    runs_max=0 if arguments.smoke or arguments.runs else RUNS_MAX,
-                    extra_seconds=QUICK_EXTRA_SECONDS if arguments.quick else WHOLE_EXTRA_SECONDS,
                     clients=SMOKE_CLIENTS if arguments.smoke else None, hub_arguments=arguments.hub_argument,
                     tries_max=1 if arguments.smoke else 2,
                     patience_seconds=SMOKE_PATIENCE_SECONDS if arguments.smoke else Settings.patience_seconds)
@@ -187,7 +182,7 @@ def measure(arguments: argparse.Namespace) -> int:
                 "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
                 "seconds": settings.seconds, "longer": [[*dataclasses.astuple(case), least, subjects] for case, (least, subjects) in
                                                                 suite.WHOLE_SECONDS.items() if settings.seconds_of is not None and not arguments.smoke],
-                "runs": settings.runs, "runs_max": settings.runs_max, "hub_arguments": settings.hub_arguments}
+                "runs": settings.runs, "hub_arguments": settings.hub_arguments}
     if arguments.json:
         print(json.dumps(document, indent=1))
     if arguments.report:

@@ -49,11 +49,6 @@ class Comparison:
     pairs: int
 
     @property
-    def confidence(self) -> float:
-        """That there is a difference at all."""
-        return 1 - self.p_of_all
-
-    @property
     def is_shown(self) -> bool:
         return not self.low <= 1 <= self.high
 
@@ -95,10 +90,6 @@ def interval(differences: list[float], cases: int) -> tuple[float, float]:
     return (averages[ruled_out - 1], averages[-ruled_out]) if ruled_out else (-math.inf, math.inf)
 
 
-def logarithms_of(pairs: list[tuple[float, float]]) -> list[float]:
-    return [logarithm_of(old, new) for old, new in pairs]
-
-
 def logarithm_of(old: float, new: float) -> float:
     if old == new:
         return 0.0  # both may be 0
@@ -108,7 +99,7 @@ def logarithm_of(old: float, new: float) -> float:
 
 def compare_all(cases: list[list[tuple[float, float]]]) -> list[Comparison]:
     """REQUIRES: of each case pairs of old and new, none below 0."""
-    return [compare(logarithms_of(pairs), len(cases)) for pairs in cases]
+    return [compare([logarithm_of(old, new) for old, new in pairs], len(cases)) for pairs in cases]
 
 
 def compare(logarithms: list[float], cases: int) -> Comparison:
@@ -192,22 +183,18 @@ def measure_pairs(case: Case, other: pathlib.Path, count: int, settings: Setting
 
 def describe(case: Case, comparison: Comparison) -> str:
     change, low, high = ((each - 1) * 100 for each in (comparison.ratio, comparison.low, comparison.high))
-    confidence = f", confidence {comparison.confidence * 100:.1f} %" if comparison.is_shown else ""
+    confidence = f", confidence {(1 - comparison.p_of_all) * 100:.1f} %" if comparison.is_shown else ""
     return (f"{str(case):32} {case.spec.metric:20} {change:+6.1f} %  (between {low:+.1f} and {high:+.1f} %)  "
             f"{comparison.verdict}{confidence}, {comparison.pairs} pairs")
 
 
 def explain(comparisons: list[Comparison]) -> str:
     """What the brackets, the verdicts and the confidence say."""
-    count = len(comparisons)
-    changes, any_case = (f"the true changes of all {count} cases lie", f" in any of the {count} cases") if count > 1 else ("the true change lies", "")
-    text = (f"In at least {CONFIDENCE * 100:.0f} of 100 such comparisons {changes} between what the brackets say (Wilcoxon's signed-rank test). 'Faster' "
-            "and 'slower': the brackets leave 0 out.\n'No difference shown': they do not; there may be one, no larger than they say.")
-    shown = [each.p_of_all for each in comparisons if each.is_shown]
-    if shown:
-        text += (f"\nConfidence {(1 - max(shown)) * 100:.1f} %: were the versions equally fast, chance would show a difference this clear{any_case} in at most "
-                 f"{max(shown) * 100:.1f} of 100 such comparisons.")
-    return text
+    of_all = f" of all {len(comparisons)} cases" if len(comparisons) > 1 else ""
+    text = (f"In {CONFIDENCE:.0%} of such comparisons the true changes{of_all} lie between what the brackets say (Wilcoxon's signed-rank test).\n"
+            "'Faster' and 'slower': they leave 0 out. 'No difference shown': there may be one, no larger than they say.")
+    is_shown = any(each.is_shown for each in comparisons)
+    return text + (f"\nThe confidence is 1 - p of the test{of_all} together." if is_shown else "")
 
 
 def require_comparable(root: pathlib.Path, revision: str, cases: list[Case], count: int | None) -> None:
@@ -242,5 +229,5 @@ def compare_versions(root: pathlib.Path, revision: str, cases: list[Case], count
             "comparisons": [
         {"scenario": case.scenario, "size": case.size, "transport": case.transport, "metric": case.spec.metric,
          "ratio": each.ratio, "low": each.low, "high": each.high, "p": each.p, "p_of_all": each.p_of_all,
-         "confidence": each.confidence, "pairs": each.pairs, "verdict": each.verdict}
+         "confidence": 1 - each.p_of_all, "pairs": each.pairs, "verdict": each.verdict}
         for case, each in zip(cases, comparisons)]}

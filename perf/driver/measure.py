@@ -4,21 +4,16 @@ import json
 import pathlib
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from driver.rows import Outcome, key_of, make_rows, values_of
+from driver.rows import Outcome
 from driver.subjects import (CLIENTS, Subject, SubjectError, allowed_cpus, child_setup, make_subject, read_line, why_absent)
-from driver.suite import GOALS, RIVALS, Case, Goal, Plan, standing
+from driver.suite import RIVALS, Case, Plan
 
 # A generator that takes this much longer than its measurement hangs.
 EXTRA_SECONDS = 35
 LEDGER = ("ledger_gap", "dropped_frames", "queued_frames")
-# Of the time for runs that are made again, one group takes at most this much of what is left.
-GROUP_SHARE = 0.2
-# Runs that lie further apart come from more than one state of the machine or of the subject: three may all have met one.
-APART_MAX = 1.5
 
 
 @dataclass
@@ -31,8 +26,6 @@ class Settings:
     hub_arguments: list[str] = field(default_factory=list)
     tries_max: int = 2  # of each run
     patience_seconds: float = 2.0  # a message that takes longer is lost
-    runs_max: int = 0  # of groups of which runs lie far apart or decide nothing; not above `runs`: none of them is made again
-    extra_seconds: float = 0  # what is left for such runs
 
     def length_of(self, subject: str, case: Case) -> float:
         """Of one measurement, in seconds."""
@@ -132,7 +125,7 @@ def run_round(members: list[Outcome], number: int, settings: Settings) -> None:
     for outcome in members if number % 2 == 0 else reversed(members):
         if outcome.error is not None:
             continue
-        say(f"  {outcome.subject}: {outcome.case} ({number + 1}/{max(settings.runs, number + 1)})")
+        say(f"  {outcome.subject}: {outcome.case} ({number + 1}/{settings.runs})")
         try:
             outcome.add(number, run_patiently(outcome, settings))
         except SubjectError as error:
@@ -140,46 +133,9 @@ def run_round(members: list[Outcome], number: int, settings: Settings) -> None:
             say(f"error: {outcome.case}: {outcome.error}")
 
 
-def times_apart(values: list[float]) -> float:
-    return max(values) / min(values) if values and min(values) > 0 else 1.0
-
-
-def is_wild(outcome: Outcome) -> bool:
-    metric = outcome.case.spec.metric
-    return times_apart([found[metric] for found in outcome.findings if metric in found]) > APART_MAX
-
-
-def decides_nothing(goal: Goal, row: dict) -> bool:
-    values = values_of(row, goal.field)
-    return bool(values) and None in (standing(goal, values, limit) for limit in (goal.goal, goal.bound) if limit is not None)
-
-
-def is_doubtful(group: list[Outcome]) -> bool:
-    """Do runs of the group lie far apart, or is there a bound or a goal that some of its runs meet and others do not?"""
-    rows = {key_of(row): row for row in make_rows(group)}
-    return any(outcome.error is None and is_wild(outcome) for outcome in group) or any(
-        decides_nothing(goal, rows[key]) for goal in GOALS
-        if (key := (goal.subject, goal.scenario, goal.size, goal.transport)) in rows)
-
-
 def run_group(outcomes: list[Outcome], settings: Settings) -> None:
     for number in range(settings.runs):
         run_round(outcomes, number, settings)
-    repeat(outcomes, settings)
-
-
-def repeat(outcomes: list[Outcome], settings: Settings) -> None:
-    """More runs of a doubtful group, as long as there is time for that: no group takes more than its share of it. Whether it is
-    doubtful is looked up once: to stop as soon as something is decided would be to choose the answer."""
-    left_for_others = settings.extra_seconds * (1 - GROUP_SHARE)
-    if settings.runs >= settings.runs_max or not is_doubtful(outcomes):
-        return
-    for number in range(settings.runs, settings.runs_max):
-        if settings.extra_seconds <= left_for_others:
-            return
-        begin = time.monotonic()
-        run_round(outcomes, number, settings)
-        settings.extra_seconds -= time.monotonic() - begin
 
 
 def make_group(members: list[tuple[Case, tuple[str, ...]]], build: pathlib.Path) -> list[Outcome]:

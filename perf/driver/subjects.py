@@ -180,7 +180,7 @@ def find_program(name: str) -> str | None:
 
 
 def free_port() -> int:
-    """Free when this returns; a start that finds it taken is tried again with another."""
+    """Free when this returns; a run that finds it taken is made again with another."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return probe.getsockname()[1]
@@ -192,25 +192,14 @@ class Rival(Subject):
     program = ""
     package = ""
     prints_ready = False
-    starts_max = 3
 
     def __init__(self, build: pathlib.Path, cpus: list[int]):
         super().__init__(build, cpus)
         self._port = 0
 
-    @classmethod
-    def why_absent(cls, build: pathlib.Path) -> str | None:
-        return None if find_program(cls.program) else f"{cls.program} is not installed (package {cls.package})"
-
     def __enter__(self) -> "Rival":
-        for attempt in range(self.starts_max):
-            self._port = free_port()
-            try:
-                return super().__enter__()
-            except SubjectError:
-                if attempt == self.starts_max - 1:
-                    raise
-        raise AssertionError("not reached")
+        self._port = free_port()
+        return super().__enter__()
 
     def _await_ready(self) -> None:
         deadline = time.monotonic() + READY_SECONDS
@@ -266,28 +255,21 @@ HUBS = {"tcphub": [], "tcphub_2_shards": ["--shards", "2"], "tcphub_spinning": [
 RIVAL_CLASSES = {rival.name: rival for rival in (Nats, Mosquitto)}
 CLIENTS = {"tcphub": "library_client_nif", "nats": "library_client_nats", "mosquitto": "library_client_mosquitto"}
 SUBJECTS = ("null", *HUBS, *RIVAL_CLASSES)
-OF_LIBRARIES = "other hubs are measured by their libraries only"
 LIBRARY_PACKAGES = {"nats": "libnats-dev", "mosquitto": "libmosquitto-dev"}
-
-
-def why_never(name: str, case: Case) -> str | None:
-    """Why there can be no row of this subject for this case, whatever is built or installed."""
-    if name in RIVAL_CLASSES and case.spec.roles is None:
-        return OF_LIBRARIES
-    if name == "null" and case.baseline is None:
-        return "a relay without queues says nothing here"
-    if name not in RIVAL_CLASSES:
-        return None
-    return None if case.transport in RIVAL_CLASSES[name].transports else "it has no Unix socket"
 
 
 def why_absent(name: str, case: Case, build: pathlib.Path) -> str | None:
     """Why there will be no row of this subject for this case; None: there will be one."""
-    if (never := why_never(name, case)) is not None or name not in RIVAL_CLASSES:
-        return never
+    if name not in RIVAL_CLASSES:
+        return "a relay without queues says nothing here" if name == "null" and case.baseline is None else None
+    rival = RIVAL_CLASSES[name]
+    if case.spec.roles is None:
+        return "other hubs are measured by their libraries only"
+    if case.transport not in rival.transports:
+        return "it has no Unix socket"
     if not (build / "bin" / CLIENTS[name]).exists():
         return f"{CLIENTS[name]} was not built: no library (package {LIBRARY_PACKAGES[name]})"
-    return RIVAL_CLASSES[name].why_absent(build)
+    return None if find_program(rival.program) else f"{rival.program} is not installed (package {rival.package})"
 
 
 def make_subject(name: str, case: Case, build: pathlib.Path, hub_arguments: list[str]) -> Subject:
@@ -304,20 +286,12 @@ def make_subject(name: str, case: Case, build: pathlib.Path, hub_arguments: list
     return TcpHub(build, own, [*HUBS[name], *hub_arguments], name)
 
 
-def _version_of(command: list[str]) -> str | None:
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=10, stdin=subprocess.DEVNULL)
-    except (OSError, subprocess.TimeoutExpired):
-        return None
-    found = re.search(r"\d+\.\d+(\.\d+)*", done.stdout + done.stderr)
-    return found.group(0) if found else None
-
-
 def rival_versions(names: list[str]) -> dict[str, str]:
-    """What of the other hubs is installed, and its version."""
+    """What of the other hubs and their libraries is installed, and its version."""
     versions = {}
     for name in (name for name in names if name in RIVAL_CLASSES):
-        library, program = LIBRARY_PACKAGES[name], find_program(RIVAL_CLASSES[name].program)
-        versions[library.removesuffix("-dev")] = _version_of(["dpkg-query", "-W", "-f=${Version}", library])
-        versions[name] = _version_of([program, "-h" if name == "mosquitto" else "--version"]) if program else None
-    return {name: version for name, version in versions.items() if version is not None}
+        for package in (LIBRARY_PACKAGES[name], RIVAL_CLASSES[name].package):
+            done = subprocess.run(["dpkg-query", "-W", "-f=${Version}", package], capture_output=True, text=True, check=False)
+            if found := re.search(r"\d+\.\d+(\.\d+)*", done.stdout):
+                versions[package.removesuffix("-dev").removesuffix("-server")] = found.group(0)
+    return versions

@@ -269,10 +269,6 @@ GOALS = (
     # A publisher that is blocked stands still as long as the stalled one does (0.75 s); one that is not, as long as the system lets it.
     Goal("stalled_subscriber", 1024, "tcp", "publisher_pause_ms", None, 100),
     Goal("idle_10000", 16, "tcp", "rss_bytes_per_connection", 1024, 1024),
-    # No processor time beyond keep-alives: to the letter, what they would cost without a pause taken off; and by what each costs, times what it
-    # does to a hub that has nothing but keep-alives to do.
-    Goal("idle_10000", 16, "tcp", "cpu_share_beyond_keep_alives", None, 0),
-    Goal("idle_10000", 16, "tcp", "keep_alive_over_busy", None, 1.25),
     Goal("idle_alone", 16, "tcp", "cpu_share", None, 0),
     Goal("idle_alone", 16, "tcp", "context_switches_per_second", None, 0),
     Goal("connect_10000", 16, "tcp", "seconds_over_null", None, 0.5),
@@ -301,9 +297,7 @@ FIELD_TITLES = {
     "rss_growth_bytes": "bytes grown by for the stalled one",
     "publisher_pause_ms": "the publisher's longest time without a write, ms",
     "rss_bytes_per_connection": "resident bytes a connection",
-    "keep_alive_over_busy": "CPU of a keep-alive, times that of one among many at once",
     "cpu_share": "of a processor used",
-    "cpu_share_beyond_keep_alives": "of a processor used beyond keep-alives",
     "context_switches_per_second": "context switches/s",
     "seconds_over_null": "seconds longer than the null relay",
     "rate_over_best": "messages/s, times the best other library on TCP",

@@ -11,9 +11,6 @@ namespace {
 constexpr std::size_t kClients = 10'000;
 /// Long enough for every client's first keep-alive.
 constexpr std::chrono::seconds kSettling{2};
-/// Of all clients, one after the other, to learn what a keep-alive costs a subject that is busy
-/// with them.
-constexpr int kBusyRounds = 5;
 /// A subject that has just started still does what belongs to that.
 constexpr std::chrono::milliseconds kStarting{500};
 
@@ -35,61 +32,35 @@ void await_answers(Engine& engine) {
   if (!answered) fail("the subject did not answer all keep-alives in time");
 }
 
-/// The time that the subject used from rest to rest, and the keep-alives that it had: word and
-/// answer are one.
-struct KeepAlivesUsed {
-  double cpu_ns = 0;
-  double seconds = 0;
-  double keep_alives = 0;
-};
-
-template <class Meanwhile>
-KeepAlivesUsed use_of(Engine& engine, const RunOptions& options, const Meanwhile& meanwhile) {
-  await_answers(engine);
-  const KeepAlives before = engine.wire().keep_alives();
-  const auto cpu_begin_ns = cpu_time_ns(options.process);
-  const auto begin = Clock::now();
-  meanwhile();
-  await_answers(engine);
-  const KeepAlives& after = engine.wire().keep_alives();
-  const std::uint64_t count = after.answered - before.answered + after.asked - before.asked;
-  return {.cpu_ns = static_cast<double>(cpu_time_ns(options.process) - cpu_begin_ns),
-          .seconds = seconds_since(begin),
-          .keep_alives = static_cast<double>(count)};
-}
-
 }  // namespace
 
-/// Resident bytes and processor time of connections that say nothing but keep-alives, and what one
-/// of these costs there and among as many that follow each other at once.
+/// Resident bytes and processor time of connections that say nothing but keep-alives. Word and
+/// answer are one keep-alive.
 Findings idle(Engine& engine, const RunOptions& options) {
   const auto count = static_cast<double>(count_of(options));
   const auto resident_before = resident_bytes(options.process);
   engine.connect(count_of(options));
   std::ignore =
       engine.poll_until(never, std::min<std::chrono::nanoseconds>(2 * options.duration, kSettling));
-  const KeepAlivesUsed idle =
-      use_of(engine, options, [&] { std::ignore = engine.poll_until(never, options.duration); });
-  const auto resident = static_cast<double>(resident_bytes(options.process) - resident_before);
+  await_answers(engine);
+  const KeepAlives before = engine.wire().keep_alives();
+  const auto cpu_begin_ns = cpu_time_ns(options.process);
+  const auto begin = Clock::now();
+  std::ignore = engine.poll_until(never, options.duration);
+  await_answers(engine);
+  const KeepAlives& after = engine.wire().keep_alives();
+  const std::uint64_t keep_alives = after.answered - before.answered + after.asked - before.asked;
+  const auto cpu_ns = static_cast<double>(cpu_time_ns(options.process) - cpu_begin_ns);
+  const double seconds = seconds_since(begin);
 
   Findings findings;
-  findings.add("rss_bytes_per_connection", resident / count);
-  findings.add("cpu_share", idle.cpu_ns / 1e9 / idle.seconds);
+  findings.add("rss_bytes_per_connection",
+               static_cast<double>(resident_bytes(options.process) - resident_before) / count);
+  findings.add("cpu_share", cpu_ns / 1e9 / seconds);
   findings.add("connections", count);
-  if (idle.keep_alives == 0) return findings;
-  const KeepAlivesUsed busy = use_of(engine, options, [&] {
-    for (int round = 0; round < kBusyRounds; ++round) {
-      engine.keep_alive();
-      await_answers(engine);
-    }
-  });
-  const double busy_ns = busy.cpu_ns / busy.keep_alives;
-  findings.add("keep_alives_per_second", idle.keep_alives / idle.seconds);
-  findings.add("keep_alive_ns", idle.cpu_ns / idle.keep_alives);
-  findings.add("keep_alive_ns_busy", busy_ns);
-  findings.add("keep_alive_over_busy", idle.cpu_ns / idle.keep_alives / busy_ns);
-  findings.add("cpu_share_beyond_keep_alives",
-               (idle.cpu_ns - idle.keep_alives * busy_ns) / 1e9 / idle.seconds);
+  if (keep_alives == 0) return findings;
+  findings.add("keep_alives_per_second", static_cast<double>(keep_alives) / seconds);
+  findings.add("keep_alive_ns", cpu_ns / static_cast<double>(keep_alives));
   return findings;
 }
 

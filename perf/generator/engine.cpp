@@ -38,7 +38,7 @@ Engine::~Engine() {
 void Engine::connect(std::size_t count) {
   for (std::size_t begun = 0; begun < count; ++begun) {
     clients_.push_back(std::make_unique<Client>(clients_.size(), connect_to(address_)));
-    watch(*clients_.back());
+    watch(*clients_.back(), EPOLL_CTL_ADD, EPOLLIN);
     wire_.open(*clients_.back());
     const bool room = poll_until(
         [this] { return clients_.size() - wire_.joined_count() < kJoiningMax; }, answer_limit());
@@ -49,11 +49,11 @@ void Engine::connect(std::size_t count) {
   if (!all) fail("the subject did not admit all clients in time");
 }
 
-void Engine::watch(Client& client) const {
+void Engine::watch(Client& client, int operation, std::uint32_t events) const {
   epoll_event event{};
-  event.events = EPOLLIN;
+  event.events = events;
   event.data.ptr = &client;
-  if (::epoll_ctl(epoll_, EPOLL_CTL_ADD, client.socket(), &event) != 0) fail("epoll_ctl", errno);
+  if (::epoll_ctl(epoll_, operation, client.socket(), &event) != 0) fail("epoll_ctl", errno);
 }
 
 void Engine::join_group(std::size_t first_subscriber, std::size_t count) {
@@ -106,16 +106,21 @@ bool Engine::poll_until(const std::function<bool()>& done, std::chrono::nanoseco
   return true;
 }
 
-void Engine::stop_reading(Client& client) {
-  client.is_reading = false;
-  epoll_event event{};
-  event.data.ptr = &client;
-  if (::epoll_ctl(epoll_, EPOLL_CTL_MOD, client.socket(), &event) != 0) fail("epoll_ctl", errno);
-}
+void Engine::stop_reading(Client& client) { watch(client, EPOLL_CTL_MOD, 0); }
 
 void Engine::close(Client& client) {
   client.is_closed = true;
   client.close();  // which takes it out of the epoll, too
+}
+
+Engine::Counts Engine::counts() const {
+  Counts counts;
+  for (const auto& client : clients_) {
+    counts.delivered += client->inbox.delivered();
+    counts.lost += client->inbox.lost();
+    counts.wrong += client->inbox.wrong();
+  }
+  return counts;
 }
 
 void Engine::read(Client& client) {
@@ -136,8 +141,7 @@ void Engine::on_closed(Client& client) {
   if (!is_closing_tolerated_)
     fail("the subject closed the connection of client " + std::to_string(client.index()));
   client.is_closed = true;
-  ++closed_count_;
-  if (::epoll_ctl(epoll_, EPOLL_CTL_DEL, client.socket(), nullptr) != 0) fail("epoll_ctl", errno);
+  watch(client, EPOLL_CTL_DEL, 0);
 }
 
 void Engine::keep_alive() {

@@ -32,8 +32,6 @@ class Engine {
   /// Waits at most `timeout` for something to read, then reads every ready client once. Returns the
   /// messages that were settled (delivered or known as lost) by that.
   std::uint64_t poll(std::chrono::nanoseconds timeout);
-  /// Lets every client say that it is there, as poll() does when it is time to.
-  void keep_alive();
   /// Polls until `done` holds; false after `limit`.
   [[nodiscard]] bool poll_until(const std::function<bool()>& done, std::chrono::nanoseconds limit);
 
@@ -52,10 +50,17 @@ class Engine {
   [[nodiscard]] Client& client(std::size_t index) { return *clients_[index]; }
   [[nodiscard]] std::size_t client_count() const { return clients_.size(); }
   [[nodiscard]] Wire& wire() { return wire_; }
-  [[nodiscard]] std::size_t closed_count() const { return closed_count_; }
+  /// Of all clients together.
+  struct Counts {
+    std::uint64_t delivered = 0;
+    std::uint64_t lost = 0;
+    std::uint64_t wrong = 0;
+  };
+  [[nodiscard]] Counts counts() const;
 
  private:
-  void watch(Client& client) const;
+  void watch(Client& client, int operation, std::uint32_t events) const;
+  void keep_alive();
   void read(Client& client);
   void on_closed(Client& client);
 
@@ -65,7 +70,6 @@ class Engine {
   std::unique_ptr<std::byte[]> buffer_;
   std::vector<std::unique_ptr<Client>> clients_;
   Clock::time_point next_keep_alive_;
-  std::size_t closed_count_ = 0;
   bool is_closing_tolerated_ = false;
   std::chrono::nanoseconds patience_ = std::chrono::seconds(2);
 };

@@ -98,12 +98,12 @@ class MessageBlock {
 /// order. A gap in the sequence counts as lost; anything else that differs counts as wrong.
 class Inbox {
  public:
-  /// From now on messages of `stream` with payloads of `size` bytes are expected, beginning with
-  /// `first_sequence`.
-  void expect(StreamId stream, std::size_t size, std::uint64_t first_sequence = 0) {
+  /// From now on messages of `stream` with payloads of `size` bytes are expected, from the first
+  /// on.
+  void expect(StreamId stream, std::size_t size) {
     payload_ = pattern_payload(size);
     stream_ = stream;
-    next_sequence_ = first_sequence;
+    next_sequence_ = 0;
     piece_end_ = 0;
   }
 

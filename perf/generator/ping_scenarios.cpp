@@ -125,11 +125,7 @@ Findings measure(Engine& engine, const RunOptions& options, PingPair& pair,
   const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
   const auto bulk_bytes = static_cast<double>((pair.bulk_delivered() - bulk_before) * kBulkBytes);
   pair.drain();
-  std::uint64_t wrong = 0;
-  for (std::size_t index = 0; index < engine.client_count(); ++index) {
-    wrong += engine.client(index).inbox.wrong();
-    lost += engine.client(index).inbox.lost();
-  }
+  const Engine::Counts counts = engine.counts();
   const auto count = static_cast<double>(round_trips_ns.size());
 
   Findings findings;
@@ -138,8 +134,8 @@ Findings measure(Engine& engine, const RunOptions& options, PingPair& pair,
   findings.add("messages", 2 * count);
   findings.add("cpu_ns_per_message", cpu_ns / (2 * count));
   if (bulk_bytes > 0) findings.add("bulk_bytes_per_second", bulk_bytes / seconds);
-  findings.add("lost", static_cast<double>(lost));
-  findings.add("wrong", static_cast<double>(wrong));
+  findings.add("lost", static_cast<double>(lost + counts.lost));
+  findings.add("wrong", static_cast<double>(counts.wrong));
   return findings;
 }
 

@@ -17,12 +17,17 @@ Findings fan_out_to(Engine& engine, const RunOptions& options) {
   return fan_out(engine, options, count);
 }
 
+template <std::size_t count, Writing writing = Writing::batched>
+Findings pairs_of(Engine& engine, const RunOptions& options) {
+  return pairs(engine, options, count, writing);
+}
+
 // ping_one_cpu and ping_two_cpus are one scenario here: where the processes run is the driver's
 // affair.
 constexpr Named kScenarios[] = {
-    {"one_to_one", one_to_one},
-    {"one_to_one_unbatched", one_to_one_unbatched},
-    {"four_to_four", four_to_four},
+    {"one_to_one", pairs_of<1>},
+    {"one_to_one_unbatched", pairs_of<1, Writing::unbatched>},
+    {"four_to_four", pairs_of<4>},
     {"in_turns", in_turns},
     {"fan_out_10", fan_out_to<10>},
     {"fan_out_100", fan_out_to<100>},

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "generator/engine.hpp"
+#include "generator/flood.hpp"
 
 namespace gimnet::perf {
 
@@ -48,9 +49,7 @@ using Scenario = Findings (*)(Engine& engine, const RunOptions& options);
 
 // throughput_scenarios.cpp: hub CPU per delivered message; the last one has a subscriber that does
 // not read beside one that does.
-Findings one_to_one(Engine& engine, const RunOptions& options);
-Findings one_to_one_unbatched(Engine& engine, const RunOptions& options);
-Findings four_to_four(Engine& engine, const RunOptions& options);
+Findings pairs(Engine& engine, const RunOptions& options, std::size_t pair_count, Writing writing);
 Findings in_turns(Engine& engine, const RunOptions& options);
 Findings list_100(Engine& engine, const RunOptions& options);
 Findings fan_out(Engine& engine, const RunOptions& options, std::size_t subscriber_count);

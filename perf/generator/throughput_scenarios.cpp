@@ -9,37 +9,20 @@ namespace {
 
 constexpr std::chrono::milliseconds kWarmUp{150};
 
-struct Counts {
-  std::uint64_t delivered = 0;
-  std::uint64_t lost = 0;
-  std::uint64_t wrong = 0;
-};
-
-Counts count_inboxes(Engine& engine) {
-  Counts counts;
-  for (std::size_t index = 0; index < engine.client_count(); ++index) {
-    const Inbox& inbox = engine.client(index).inbox;
-    counts.delivered += inbox.delivered();
-    counts.lost += inbox.lost();
-    counts.wrong += inbox.wrong();
-  }
-  return counts;
-}
-
 /// Warms up, then measures from rest to rest, so that the processor time belongs to exactly the
 /// messages counted.
 Findings measure(Engine& engine, const RunOptions& options, std::vector<Publisher> publishers,
                  std::size_t recipients_a_message = 1) {
   Flood flood(engine, std::move(publishers), recipients_a_message);
   flood.warm_up(std::min<std::chrono::nanoseconds>(kWarmUp, options.duration));
-  const Counts before = count_inboxes(engine);
+  const Engine::Counts before = engine.counts();
   const auto begin = Clock::now();
   const auto cpu_begin_ns = cpu_time_ns(options.process);
   flood.run_for(options.duration);
   flood.drain();
   const auto cpu_ns = static_cast<double>(cpu_time_ns(options.process) - cpu_begin_ns);
   const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
-  const Counts after = count_inboxes(engine);
+  const Engine::Counts after = engine.counts();
   const auto delivered = static_cast<double>(after.delivered - before.delivered);
 
   Findings findings;
@@ -66,16 +49,6 @@ Publisher publisher_of(Engine& engine, const RunOptions& options, std::size_t fr
           MessageShape{.payload_bytes = options.payload_bytes}, writing};
 }
 
-Findings pairs(Engine& engine, const RunOptions& options, std::size_t pair_count, Writing writing) {
-  engine.connect(2 * pair_count);
-  std::vector<Publisher> publishers;
-  for (std::size_t pair = 0; pair < pair_count; ++pair) {
-    const Target target = expecting(engine, options, 2 * pair + 1, pair);
-    publishers.push_back(publisher_of(engine, options, 2 * pair, {target}, writing));
-  }
-  return measure(engine, options, std::move(publishers));
-}
-
 /// One message of client 0 to all others.
 Findings to_all(Engine& engine, const RunOptions& options, const Target& target,
                 std::size_t recipient_count) {
@@ -86,16 +59,14 @@ Findings to_all(Engine& engine, const RunOptions& options, const Target& target,
 
 }  // namespace
 
-Findings one_to_one(Engine& engine, const RunOptions& options) {
-  return pairs(engine, options, 1, Writing::batched);
-}
-
-Findings one_to_one_unbatched(Engine& engine, const RunOptions& options) {
-  return pairs(engine, options, 1, Writing::unbatched);
-}
-
-Findings four_to_four(Engine& engine, const RunOptions& options) {
-  return pairs(engine, options, 4, Writing::batched);
+Findings pairs(Engine& engine, const RunOptions& options, std::size_t pair_count, Writing writing) {
+  engine.connect(2 * pair_count);
+  std::vector<Publisher> publishers;
+  for (std::size_t pair = 0; pair < pair_count; ++pair) {
+    const Target target = expecting(engine, options, 2 * pair + 1, pair);
+    publishers.push_back(publisher_of(engine, options, 2 * pair, {target}, writing));
+  }
+  return measure(engine, options, std::move(publishers));
 }
 
 Findings in_turns(Engine& engine, const RunOptions& options) {

@@ -40,7 +40,6 @@ class Client {
   Inbox inbox;
   bool is_joined = false;    ///< the subject has admitted it
   bool is_in_group = false;  ///< provides or subscribes, as asked
-  bool is_reading = true;    ///< a stalled client is not read
   bool is_closed = false;    ///< by the subject, or by close()
   /// PAUSEs that were not lifted yet (one RESUME lifts any number for its target): nothing is
   /// published meanwhile.

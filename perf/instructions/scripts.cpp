@@ -2,9 +2,8 @@
 // compared with perf/instructions/budget.json. Under valgrind's callgrind, which counts nothing but
 // what runs below counted().
 //
-//     instruction_scripts SCRIPT    runs it: once to warm up, then once counted; prints the frames
-//     of the counted run instruction_scripts           prints what compiled it, and the scripts'
-//     names
+//     instruction_scripts SCRIPT    runs it twice, the second time counted; prints the frames
+//     instruction_scripts           prints what compiled it, and the names of the scripts
 
 #include <gnu/libc-version.h>
 
@@ -167,9 +166,7 @@ Work mailbox() {
           }};
 }
 
-/// One turn of a whole shard: from a connection's bytes in memory to other connections' bytes in
-/// memory.
-/// A turn in which the shard reads what a node wrote. A type of its own: the name of a lambda would
+/// A turn of a shard that reads what a node wrote. A type of its own: the name of a lambda would
 /// have those of the test rig in it, whose work is not counted.
 struct Turn {
   std::shared_ptr<testing::HubRig> rig;

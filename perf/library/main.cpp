@@ -152,9 +152,25 @@ class BurstSender {
   std::atomic<std::uint64_t> answers_{0};
 };
 
-void say_ready() {
+/// The cost of `work` for all three processes. It returns the number of messages that it passed.
+template <class Work>
+Findings measured(const PairOptions& options, const Work& work) {
+  const auto begin = Clock::now();
+  const ThreeProcesses processes(::getpid(), options.partner, options.hub);
+  const auto messages = static_cast<double>(work());
+  const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
+  Findings findings;
+  findings.add("messages_per_second", messages / seconds);
+  findings.add("messages", messages);
+  processes.add_to(findings, std::max(1.0, messages));
+  return findings;
+}
+
+/// Says that it is ready, and then only answers.
+[[noreturn]] void serve(LibraryClient& client) {
   std::puts("ready");
   std::fflush(stdout);
+  for (;;) static_cast<void>(client.wait(Clock::now() + kAskAgain));
 }
 
 /// Sends, with a bounded number of messages under way, and says what it cost all three processes.
@@ -164,16 +180,11 @@ Findings send_bursts(LibraryClient& client, LibraryClient::Setup setup,
   sender.run(options.duration / 5);  // to warm up
   sender.settle();
   const std::uint64_t delivered_before = sender.delivered();
-  const auto begin = Clock::now();
-  const ThreeProcesses processes(::getpid(), options.partner, options.hub);
-  sender.run(options.duration);
-  sender.settle();
-  const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
-  const auto delivered = static_cast<double>(sender.delivered() - delivered_before);
-  Findings findings;
-  findings.add("messages_per_second", delivered / seconds);
-  findings.add("messages", delivered);
-  processes.add_to(findings, std::max(1.0, delivered));
+  Findings findings = measured(options, [&] {
+    sender.run(options.duration);
+    sender.settle();
+    return sender.delivered() - delivered_before;
+  });
   findings.add("lost", static_cast<double>(sender.lost()));
   findings.add("wrong", static_cast<double>(sender.wrong()));
   return findings;
@@ -200,8 +211,7 @@ Findings send_bursts(LibraryClient& client, LibraryClient::Setup setup,
     next_report = inbox.delivered() + report_every;
     report(is_question);
   });
-  say_ready();
-  for (;;) static_cast<void>(client.wait(Clock::now() + kAskAgain));
+  serve(client);
 }
 
 constexpr StreamId kThere = 1;
@@ -276,16 +286,11 @@ Findings make_round_trips(LibraryClient& client, LibraryClient::Setup setup,
   Pinger pinger(client, setup, options);
   pinger.run(options.duration / 5);  // to warm up
   pinger.forget_round_trips();
-  const auto begin = Clock::now();
-  const ThreeProcesses processes(::getpid(), options.partner, options.hub);
-  pinger.run(options.duration);
-  const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
-  const auto messages = 2 * static_cast<double>(pinger.round_trips_ns().size());
-  Findings findings;
+  Findings findings = measured(options, [&] {
+    pinger.run(options.duration);
+    return 2 * pinger.round_trips_ns().size();
+  });
   add_percentiles(findings, pinger.round_trips_ns());
-  findings.add("messages_per_second", messages / seconds);
-  findings.add("messages", messages);
-  processes.add_to(findings, std::max(1.0, messages));
   findings.add("lost", static_cast<double>(pinger.lost()));
   findings.add("wrong", static_cast<double>(pinger.wrong()));
   return findings;
@@ -293,8 +298,7 @@ Findings make_round_trips(LibraryClient& client, LibraryClient::Setup setup,
 
 [[noreturn]] void echo(LibraryClient& client, const LibraryClient::Setup& setup) {
   client.open(setup, [&client](std::span<const std::byte> message) { client.send(message); });
-  say_ready();
-  for (;;) static_cast<void>(client.wait(Clock::now() + kAskAgain));
+  serve(client);
 }
 
 }  // namespace

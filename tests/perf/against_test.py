@@ -52,7 +52,7 @@ class Pairs(unittest.TestCase):
             for cases in (1, 7):
                 found = compare(differences, cases)
                 verdicts.add(found.verdict)
-                self.assertEqual(found.verdict != "no difference shown", found.confidence >= CONFIDENCE)
+                self.assertEqual(found.verdict != "no difference shown", 1 - found.p_of_all >= CONFIDENCE)
                 self.assertEqual(found.verdict == "slower", found.low > 1)
                 self.assertEqual(found.verdict == "faster", found.high < 1)
                 self.assertLessEqual(found.low, found.ratio)
@@ -73,7 +73,7 @@ class Pairs(unittest.TestCase):
         for factor, verdict in ((1.05, "slower"), (0.95, "faster")):
             found = compare_all([pairs(1), pairs(factor), *[pairs(1)] * 5])
             self.assertEqual([each.verdict for each in found], ["no difference shown", verdict, *["no difference shown"] * 5])
-            self.assertGreater(found[1].confidence, 0.99)
+            self.assertGreater(1 - found[1].p_of_all, 0.99)
             self.assertLess(found[1].low, factor)
             self.assertGreater(found[1].high, factor)
 
@@ -172,7 +172,7 @@ class Report(unittest.TestCase):
         self.assertEqual([each["verdict"] for each in document["comparisons"]], ["slower", "slower"])
         self.assertIn("+9.5 %  (between +6.3 and +11.1 %)  slower", self.said[-1])
         self.assertIn("slower, confidence 98.4 %, 8 pairs", self.said[-1])
-        self.assertIn("a difference this clear in any of the 2 cases in at most 1.6 of 100", self.said[-1])
+        self.assertIn("The confidence is 1 - p of the test of all 2 cases together", self.said[-1])
         self.assertIn("the true changes of all 2 cases lie between", self.said[-1])
 
     def test_a_difference_that_is_not_shown_has_no_confidence_but_bounds(self):

@@ -5,7 +5,7 @@ import unittest
 
 from support import outcome
 from driver import measure, suite
-from driver.measure import Settings, is_doubtful, run_group
+from driver.measure import Settings, run_group
 from driver.rows import Outcome, make_rows, shown, text_table
 from driver.suite import GOALS, Goal, decisive, verdict
 
@@ -126,32 +126,11 @@ class Verdicts(unittest.TestCase):
         self.assertEqual(verdict(self.GOAL, [1.1] * 7 + [1.3, 5]), "bound met, goal undecided")
 
 
-class Repetition(unittest.TestCase):
-    def is_doubtful(self, *subjects_and_costs):
-        return is_doubtful([outcome(subject, ONE_TO_ONE, costs) for subject, costs in subjects_and_costs])
-
-    def test_runs_that_lie_close_together_and_decide_are_not_repeated(self):
-        self.assertFalse(self.is_doubtful(("null", [10, 12, 13]), ("tcphub", [10, 12, 15]), ("nats", [599, 598, 597])))
-
-    def test_a_group_is_repeated_for_one_that_is_wild(self):
-        self.assertTrue(self.is_doubtful(("null", [10, 10, 10]), ("tcphub", [10, 10, 10]), ("tcphub_2_shards", [30, 40, 50])))
-
-    def test_a_group_is_repeated_for_one_that_does_not_agree_on_a_goal(self):
-        self.assertTrue(self.is_doubtful(("null", [10, 10, 10]), ("tcphub", [12, 13, 13])))
-
-    def test_what_failed_is_no_reason(self):
-        group = [outcome("null", ONE_TO_ONE, [10, 10]), outcome("nats", ONE_TO_ONE, [10, 20])]
-        self.assertTrue(is_doubtful(group))
-        group[1].error = "it died"
-        self.assertFalse(is_doubtful(group))
-
-
 class Rounds(unittest.TestCase):
     """run_group() with runs that are written down instead of made."""
 
     def setUp(self):
         self.order = []
-        self.costs = {}
         self.addCleanup(setattr, measure, "run_patiently", measure.run_patiently)
         self.addCleanup(setattr, measure, "say", measure.say)
         measure.run_patiently = self.run_patiently
@@ -159,30 +138,11 @@ class Rounds(unittest.TestCase):
 
     def run_patiently(self, outcome, settings):
         self.order.append(outcome.subject)
-        costs = self.costs.get(outcome.subject, [1])
-        return {"cpu_ns_per_message": costs[self.order.count(outcome.subject) % len(costs)]}
+        return {"cpu_ns_per_message": 1}
 
     def test_every_second_round_goes_the_other_way(self):
         run_group([Outcome(name, ONE_TO_ONE) for name in ("null", "tcphub", "nats")], Settings(build=None, runs=3))
         self.assertEqual(self.order, ["null", "tcphub", "nats", "nats", "tcphub", "null", "null", "tcphub", "nats"])
-
-    def test_what_lies_far_apart_is_run_again_while_there_is_time(self):
-        self.costs = {"mosquitto": [1, 2]}
-        group = [Outcome(name, ONE_TO_ONE) for name in ("null", "tcphub", "nats", "mosquitto")]
-        run_group(group, Settings(build=None, runs=3, runs_max=9, extra_seconds=60))
-        self.assertEqual([each.rounds for each in group], [list(range(9))] * 4)
-
-    def test_what_decides_nothing_is_run_again_to_the_end_and_not_until_it_does(self):
-        self.costs = {"null": [10], "tcphub": [13, 13, 12] + [13] * 20}
-        group = [Outcome(name, ONE_TO_ONE) for name in ("null", "tcphub", "mosquitto")]
-        run_group(group, Settings(build=None, runs=3, runs_max=9, extra_seconds=60))
-        self.assertEqual([len(each.findings) for each in group], [9, 9, 9])
-
-    def test_without_time_for_it_nothing_is_run_again(self):
-        self.costs = {"tcphub": [1, 2]}
-        group = [Outcome(name, ONE_TO_ONE) for name in ("null", "tcphub")]
-        run_group(group, Settings(build=None, runs=3, runs_max=9, extra_seconds=0))
-        self.assertEqual([len(each.findings) for each in group], [3, 3])
 
 
 if __name__ == "__main__":

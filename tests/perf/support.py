@@ -18,4 +18,4 @@ def outcome(subject: str, case: suite.Case, costs: list[float], lost: int = 0, *
 def result_of(rows: list[dict]) -> dict:
     """What `./dev perf --json` would print of them."""
     return {"results": rows, "machine": {"processor": "p", "cpus_allowed": 2, "system": "s", "kernel": "k"}, "date": "d",
-            "version": "v", "seconds": 1, "runs": 3, "runs_max": 9, "hub_arguments": []}
+            "version": "v", "seconds": 1, "runs": 3, "hub_arguments": []}

@@ -118,7 +118,6 @@ TEST_F(FloodTest, TheSubjectSeesAClientThatIsClosed) {
   EXPECT_EQ(::recv(to_, &byte, 1, 0), 0);
   EXPECT_TRUE(engine_.client(1).is_closed);
   engine_.poll(std::chrono::nanoseconds(0));
-  EXPECT_EQ(engine_.closed_count(), 0u) << "it was not the subject who closed";
 }
 
 }  // namespace
