@@ -28,7 +28,7 @@ class Descriptor {
   int value_;
 };
 
-/// What the system calls an error, an errno: "No such file or directory".
+/// The system's words for an errno: "No such file or directory".
 [[nodiscard]] inline std::string system_text(int error) {
   return std::generic_category().message(error);
 }

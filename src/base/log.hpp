@@ -39,8 +39,8 @@ void set_log_rates(const LogRates& rates);
 /// reads holds nobody up. Thread safety: any thread. Never on the data path.
 void log_line(LogLevel level, std::string_view text);
 
-/// What somebody else may make the hub say as often as he likes: the kind of line, and who he is
-/// (without what changes from one connection to the next).
+/// The subject of a line that a peer can make the hub write as often as it likes: the kind of line,
+/// and the peer (without anything that changes from one connection to the next).
 struct LogSubject {
   std::string_view reason;
   std::string_view peer;

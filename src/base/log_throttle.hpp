@@ -12,7 +12,7 @@
 
 namespace gimnet {
 
-/// How many lines may be written now, of all kinds. Thread safety: none.
+/// Bounds the lines of all kinds that may be written now. Thread safety: none.
 class LogBudget {
  public:
   /// May a line be written? If not it is counted as left out. Twice as many as `per_s` in a burst.
@@ -26,9 +26,9 @@ class LogBudget {
   std::uint64_t left_out_ = 0;
 };
 
-/// How many lines of one kind about one peer may be written now, so that nobody who makes the same
-/// mistake again and again fills the log, nor keeps others out of it. Thread safety: none. Limits:
-/// knows the latest 1,024 subjects; one that is forgotten begins anew.
+/// Bounds the lines of one kind about one peer that may be written now. So a peer that makes the
+/// same mistake again and again neither fills the log nor keeps others out of it. Thread safety:
+/// none. Limits: knows the latest 1,024 subjects; one that is forgotten begins anew.
 class LogThrottle {
  public:
   static constexpr std::size_t kSubjectsMax = 1'024;

@@ -4,8 +4,8 @@
 
 namespace gimnet {
 
-/// Where the sockets and tokens of one user are. Hub and library look at the same place, because
-/// both ask here.
+/// The place of one user's sockets and tokens. Hub and library look at the same place, because both
+/// ask here.
 struct RuntimeFolder {
   std::string above;  ///< an absolute path
   std::string name;   ///< of the folder in it

@@ -18,9 +18,9 @@ void hold_standard_descriptors();
 /// before threads.
 void have_failed_writes_told();
 
-/// What becomes of a text for which a non-blocking stream has no room now. Others always wait: who
-/// started the process says which it is, often without knowing, as a pipe or terminal that it
-/// shares with another process.
+/// The treatment of a text for which a non-blocking stream has no room now. A blocking stream
+/// always waits. The program that started this process decides which it is, often without knowing:
+/// a pipe or terminal may be shared with another process.
 enum class WhenFull : std::uint8_t { wait, fail };
 
 /// Writes all of `text`. 0: done; else the errno (EAGAIN: there was no room; a part may have been

@@ -16,7 +16,7 @@ namespace gimnet {
 [[nodiscard]] std::string did_you_mean(std::string_view word,
                                        std::span<const std::string_view> candidates);
 
-/// What may follow the name of an option.
+/// The word that may follow the name of an option.
 enum class Takes : std::uint8_t {
   unknown,  ///< there is no such option
   nothing,  ///< `--NAME` alone

@@ -6,8 +6,8 @@
 
 namespace gimnet {
 
-/// How often something may happen: a bucket of tokens, full at first, that time fills again. Time
-/// and rate are arguments, so that a rate may change between two steps. Thread safety: none.
+/// Bounds how often something may happen: a bucket of tokens, full at first, that time fills again.
+/// Time and rate are arguments, so that a rate may change between two steps. Thread safety: none.
 class TokenBucket {
  public:
   struct Rate {

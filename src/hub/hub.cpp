@@ -81,7 +81,7 @@ class Shards final : public ShardProxy {
   bool running_ = false;
 };
 
-/// What the shards share, and what keeps it.
+/// The parts that the shards share, and their owner.
 struct Ground {
   explicit Ground(const HubOptions& options)
       : quiescence(options.shards),

@@ -224,7 +224,7 @@ std::optional<std::uint64_t> parse_amount(std::string_view text, std::span<const
 
 bool is_time(const LimitInfo& limit) { return limit.unit == "ms"; }
 
-/// What is meant by "30s" or "1MB", if it can be told: "; it is in ms: write 30000".
+/// The number that "30s" or "1MB" stands for, if it can be told: "; it is in ms: write 30000".
 std::string unit_remedy(const LimitInfo& limit, std::string_view value) {
   const std::span<const Suffix> units =
       is_time(limit) ? std::span<const Suffix>{kTimeUnits} : kByteUnits;

@@ -1,5 +1,5 @@
-// What names and services cost the conductor, and how that grows: 1,000, 10,000 and 100,000 of
-// each.
+// The cost of names and services for the conductor, and its growth: with 1,000, 10,000 and 100,000
+// of each.
 
 #include <benchmark/benchmark.h>
 

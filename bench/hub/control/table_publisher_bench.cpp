@@ -1,5 +1,5 @@
-// What one subscriber more or less of a group costs the conductor, in groups of 10, 1,000 and
-// 10,000: published alone, or with the group as a whole, as it is when the service begins.
+// The cost of one subscriber more or less for the conductor, in groups of 10, 1,000 and 10,000:
+// published alone, or with the group as a whole, as it is when the service begins.
 
 #include <benchmark/benchmark.h>
 

@@ -1,7 +1,7 @@
-// What one hop of a small message costs by the way readiness is awaited: level-triggered epoll, as
-// the shards do it, or Boost.Asio's async_wait with its handlers run in one batch. A single thread
-// plays sender, hub and receiver, so nobody sleeps and only the work is measured. The figures stand
-// in docs/adr/0005-readiness-by-epoll.md.
+// The cost of one hop of a small message by the way to wait for readiness: level-triggered epoll,
+// as the shards do it, or Boost.Asio's async_wait with its handlers run in one batch. A single
+// thread plays sender, hub and receiver, so nobody sleeps and only the work is measured. The
+// figures stand in docs/adr/0005-readiness-by-epoll.md.
 
 #include <benchmark/benchmark.h>
 #include <netinet/in.h>

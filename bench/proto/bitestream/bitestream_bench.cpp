@@ -1,4 +1,4 @@
-// What it costs to write and to read a message of a robot: some numbers, a name, and an array of a
+// The cost of writing and reading a message of a robot: some numbers, a name, and an array of a
 // laser's ranges.
 
 #include <benchmark/benchmark.h>

@@ -1,4 +1,4 @@
-// What it costs to find frames in a read buffer of 256 KiB. Goal: 2 to 3 ns a frame of 32 bytes
+// The cost of finding frames in a read buffer of 256 KiB. Goal: 2 to 3 ns a frame of 32 bytes
 // inside a run.
 
 #include <benchmark/benchmark.h>

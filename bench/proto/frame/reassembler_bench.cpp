@@ -1,4 +1,4 @@
-// What it costs to cut a message and to put it together again, beside copying its bytes once.
+// The cost of cutting a message and putting it together again, beside copying its bytes once.
 
 #include <benchmark/benchmark.h>
 

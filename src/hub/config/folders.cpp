@@ -18,8 +18,7 @@ constexpr mode_t kPrivateFolder = 0700;
 constexpr const char* kElsewhere = "name another place";
 constexpr const char* kStateElsewhere = "name another place with --state-dir";
 
-/// What can be done about a folder that cannot be made or looked at; `elsewhere` can always be
-/// done.
+/// The remedy for a folder that cannot be made or looked at; `elsewhere` always is one.
 std::string remedy_of_folder(int error, const std::string& path, const std::string& elsewhere) {
   const std::size_t slash = path.rfind('/');
   const std::string above = slash == std::string::npos ? "."
@@ -63,7 +62,7 @@ std::string make_folder(const std::string& path, struct stat& info,
   return {};
 }
 
-/// What a link at `path` leads to cannot be looked at.
+/// The fault of a link at `path` whose target cannot be looked at.
 std::string broken_link(const std::string& path, int error) {
   const std::string what = error == ENOENT
                                ? "it is a link to something that does not exist; make that folder"

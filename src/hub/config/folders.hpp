@@ -15,16 +15,16 @@ namespace gimnet::hub {
 /// prepare_private_folder().
 [[nodiscard]] Result<std::string> runtime_folder();
 
-/// Where a hub listens if nobody says: loopback, and a Unix socket in the runtime folder. Nothing
-/// is made.
+/// The addresses of a hub that is told none: loopback, and a Unix socket in the runtime folder.
+/// Nothing is made.
 [[nodiscard]] std::vector<std::string> default_addresses();
 
 /// The folder for what a hub keeps, created with mode 0700. "" or why it cannot be used: it is no
 /// folder, others may write to it, or this user may not. Root may use any user's.
 [[nodiscard]] std::string prepare_state_folder(const std::string& path);
 
-/// Where the state of the hub of that name belongs, if nobody says: `name` in STATE_DIRECTORY
-/// (systemd), else in gimnet in XDG_STATE_HOME, else in ~/.local/state/gimnet; what is above it is
+/// The default place of the state of the hub of that name: `name` in STATE_DIRECTORY (systemd),
+/// else in gimnet in XDG_STATE_HOME, else in ~/.local/state/gimnet. The folders above it are
 /// created. Errors: why there is no such place.
 [[nodiscard]] Result<std::string> default_state_folder(const std::string& name);
 

@@ -96,7 +96,7 @@ std::string help_limits() {
   return text + "\nA reload changes: " + changing + ". The others need a restart.\n";
 }
 
-/// What the option takes, as the first sentence of its help has it.
+/// The value that the option takes, as the first sentence of its help has it.
 std::string what_it_takes(const CLI::Option& option) {
   std::string takes = option.get_description();
   takes.erase(std::min(takes.find(". "), takes.size()));
@@ -109,7 +109,7 @@ std::string what_it_takes(const CLI::Option& option) {
   return takes;
 }
 
-/// What CLI11 found, in the words of this house.
+/// The error that CLI11 found, in the words of this house.
 std::string syntax_error(const CLI::App& app, const CLI::ParseError& error) {
   std::string what = error.what();
   for (const CLI::Option* option : app.get_options()) {

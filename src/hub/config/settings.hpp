@@ -17,7 +17,7 @@
 
 namespace gimnet::hub {
 
-/// How a hub is to run. A value type.
+/// The options of a hub. A value type.
 struct HubOptions {
   std::vector<ListenUrl> listen;  ///< empty: the default addresses
   std::size_t shards = 1;

@@ -264,8 +264,8 @@ ReadConfiguration read_configuration(const ConfigSources& sources, bool pipes) {
     Faults of_folder;
     const std::vector<std::string> parts = parts_beside(read.place, of_folder);
     std::error_code ignored;
-    // Where parts were enough they are so as long as there are any: a hub does not lose its
-    // configuration unnoticed.
+    // A hub that started with parts alone needs no file as long as there are any parts. So it does
+    // not lose its configuration unnoticed.
     const bool any_parts = !parts.empty() || !of_folder.empty();
     read.place.parts_alone =
         read.place.parts_alone && any_parts && !fs::exists(read.place.file, ignored);

@@ -24,7 +24,7 @@ struct ConfigText {
 /// Most files in a conf.d.
 inline constexpr std::size_t kConfigFilesMax = 256;
 
-/// Where a hub's configuration comes from, the weakest first: defaults, a file, the files in conf.d
+/// The sources of a hub's configuration, the weakest first: defaults, a file, the files in conf.d
 /// beside it, the environment, the flags. Kept so that all of it can be read again. A value type.
 struct ConfigSources {
   std::string
@@ -36,13 +36,13 @@ struct ConfigSources {
   std::string proxy{};       ///< GIMNET_PROXY; "": none
 };
 
-/// Where the files were found.
+/// The place where the files were found.
 struct ConfigPlace {
   std::string file;          ///< "": there is none
   bool parts_alone = false;  ///< as ConfigSources::parts_alone
 };
 
-/// What was read.
+/// The result of reading everything.
 struct ReadConfiguration {
   Configuration configuration;  ///< whole only where there are no faults
   Faults faults;

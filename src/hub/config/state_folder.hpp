@@ -31,7 +31,7 @@ class StateFolder {
   StateFolder(const StateFolder&) = delete;
   StateFolder& operator=(const StateFolder&) = delete;
 
-  /// What a hub kept here; nothing: no hub has.
+  /// The state that a hub kept here; nothing: no hub has.
   [[nodiscard]] Result<std::optional<HubState>> read() const;
   /// Keeps it: when this returns "", neither a crash nor a loss of power takes it away. Otherwise
   /// why it was not written; what stood there before is still there then.
@@ -63,7 +63,7 @@ class StateFolder {
   bool kept_ = false;  ///< something, since it was opened
 };
 
-/// What decides where a hub keeps its state, and from what it goes on.
+/// Decides where a hub keeps its state, and from what it goes on.
 struct StateWish {
   std::string folder;      ///< as the configuration says; "": the default
   bool draws_hub = false;  ///< it needs a hub id of its own, and has none configured

@@ -12,7 +12,7 @@ namespace gimnet::hub {
 /// Most bytes of one configuration file.
 inline constexpr std::size_t kConfigBytesMax = std::size_t{1} << 20;
 
-/// What a configuration file says, or why it cannot be read.
+/// The content of a configuration file, or why it cannot be read.
 struct TomlFile {
   std::vector<Given> keys;  ///< in the order of the file; those of [limits] as "limits.key"
   Faults faults;            ///< the first thing that is no TOML: then there are no keys

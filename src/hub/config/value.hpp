@@ -10,7 +10,7 @@
 
 namespace gimnet::hub {
 
-/// What somebody set a key to, before it is understood. A value type.
+/// The value of a key as it was written, before it is understood. A value type.
 struct ConfigValue {
   /// `words` come from the environment and the command line, where nothing tells a number from a
   /// text.
@@ -59,8 +59,8 @@ using Faults = std::vector<Fault>;
 [[nodiscard]] bool has_kind(const Given& given, ConfigValue::Kind wanted,
                             const std::string& example, Faults& faults);
 
-/// What may be written instead of a value that is no whole number: the nearest one to what can be
-/// read as a number, or `usual`.
+/// The whole number to write instead of another value: the nearest one if the value reads as a
+/// number, else `usual`.
 [[nodiscard]] std::uint64_t nearest_number(const ConfigValue& value, std::uint64_t least,
                                            std::uint64_t most, std::uint64_t usual);
 

@@ -40,7 +40,7 @@ std::string node_text(HubId hub, NodeIndex index, const std::string& name) {
   return name.empty() ? id : id + " '" + name + "'";
 }
 
-/// Whoever comes and goes again and again keeps no others out of the log.
+/// Limited by rate: a node that comes and goes again and again keeps no others out of the log.
 void say(const char* what, const std::string& about, const std::string& more = {}) {
   log_line(LogLevel::debug, {what, about}, about + " " + what + more);
 }

@@ -176,8 +176,8 @@ void Conductor::on_event(ShardEvent event, milliseconds now) {
 
 void Conductor::on_frame(const ControlFrameEvent& event, milliseconds now) {
   const Session* session = find(event.session, event.node);
-  // What a replaced connection had asked would count as declared on the new one, by which the node
-  // never asks for it.
+  // Requests of a replaced connection are not answered: they would count as declared on the new
+  // one, where the node has not asked for them.
   if (session == nullptr || event.attachment != session->attachment ||
       event.frame.size() < proto::kHeaderSize)
     return;
@@ -315,7 +315,7 @@ void Conductor::tick(milliseconds now) {
   membership_.tick(now, effects);
   if (keeper_.again_at() && *keeper_.again_at() <= now) effects.emplace_back(StateDue{});
   if (returns_published_ && membership_.sessions().returns_expected_for(now) <= milliseconds{0}) {
-    // What those of before the restart had is used no more.
+    // Indices of nodes that did not come back after the restart are free.
     if (membership_.keeping_due(now)) effects.emplace_back(StateDue{});
     wiring_.tables.nodes.expect_nobody();
     returns_published_ = false;

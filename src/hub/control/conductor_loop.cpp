@@ -130,7 +130,7 @@ struct ConductorLoop::Impl {
     });
   }
 
-  /// Who has said HELLO is not one of those who make way.
+  /// A stranger that has said HELLO does not make way for others.
   Acceptor::Room make_room(const Stranger& newcomer) {
     serve_strangers();
     return strangers.give_way_to(newcomer);
@@ -200,7 +200,7 @@ struct ConductorLoop::Impl {
     });
   }
 
-  /// What is left waits behind strangers, timers and events.
+  /// The rest waits behind strangers, timers and events.
   void tell_rest() {
     if (telling || !wiring.conductor.tell_rest(now())) return;
     telling = true;

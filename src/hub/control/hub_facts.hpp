@@ -9,7 +9,7 @@
 
 namespace gimnet::hub {
 
-/// Who this hub is. Thread safety: immutable after start-up.
+/// The identity of this hub. Thread safety: immutable after start-up.
 struct HubFacts {
   HubId id{1};
   bool id_configured = false;   ///< and not drawn, nor the default

@@ -10,7 +10,7 @@
 
 namespace gimnet::hub {
 
-/// What reading the configuration again came to. A value type.
+/// The result of reading the configuration again. A value type.
 struct Reloading {
   /// A key whose value is another one now, as a configuration file has them.
   struct Change {
@@ -36,9 +36,9 @@ void log_faults(const Reloading& reloading);
 /// One line for the log: the keys that changed, and those that need a restart.
 [[nodiscard]] std::string reload_summary(const Reloading& reloading);
 
-/// What an administrator is told of a configuration that was not taken: as many whole faults as
-/// `bytes_max` have room for, a line each, and how many more there are and where. REQUIRES: there
-/// are faults; bytes_max >= 256.
+/// Tells an administrator why a configuration was not taken: as many whole faults as `bytes_max`
+/// have room for, a line each, and how many more there are and where. REQUIRES: there are faults;
+/// bytes_max >= 256.
 [[nodiscard]] std::string reload_refusal(const Reloading& reloading, std::size_t bytes_max);
 
 }  // namespace gimnet::hub

@@ -6,7 +6,7 @@ namespace gimnet::hub {
 namespace {
 using std::chrono::milliseconds;
 
-/// How long after the state could not be kept it is tried again.
+/// The pause before another try if the state could not be kept.
 constexpr milliseconds kAgainAfter{1'000};
 }  // namespace
 

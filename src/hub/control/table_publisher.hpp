@@ -80,7 +80,7 @@ class TablePublisher {
     std::uint64_t ticket;
     std::unique_ptr<const GroupMembers> members;
   };
-  /// Where the node lives, or lived until now.
+  /// The place where the node lives, or lived until now.
   [[nodiscard]] NodePlace place_of(NodeIndex node, const Membership& membership) const;
   void put(GroupMembers& members, const Topic* topic, NodeIndex subscriber,
            const Membership& membership) const;

@@ -41,13 +41,13 @@ class Counter {
   std::atomic<std::uint64_t> value_{0};
 };
 
-/// What gap_frames of one shard stays within: a node may claim to have let go of as many frames as
-/// there are numbers, and what is asked for the sums of all shards takes them for numbers with a
-/// sign.
+/// The most that gap_frames of one shard can be. A node may claim to have let go of as many frames
+/// as there are numbers. Readers of the sums of all shards take them for numbers with a sign, in
+/// which a larger sum would be negative.
 inline constexpr std::uint64_t kGapFramesMost = std::uint64_t{1} << 56;
 
-/// What one shard did. The ledger: accepted + copies = delivered + dropped + queued, per frame and
-/// recipient. Thread safety: written by its shard only, read by anybody.
+/// The counters of one shard. The ledger: accepted + copies = delivered + dropped + queued, per
+/// frame and recipient. Thread safety: written by its shard only, read by anybody.
 struct alignas(64) ShardCounters {
   // The ledger, in frames
   Counter accepted;   ///< taken from the connections of this shard

@@ -11,10 +11,10 @@
 
 namespace gimnet::hub {
 
-/// What one session came to since it began, over all its connections. It counts with the shard's
-/// counters of the same names: of sessions that have not ended, the sum is the shards'; of
-/// `dropped`, of what was for a node that was found. Thread safety: written by the session's shard,
-/// read as SessionGauges says.
+/// The counts of one session since it began, over all its connections. They count with the shard's
+/// counters of the same names: the sum over the sessions that have not ended is the shards' sum. Of
+/// `dropped` that holds for frames to a node that was found. Thread safety: written by the
+/// session's shard, read as SessionGauges says.
 struct SessionCounters {
   std::atomic<std::uint32_t> generation{0};  ///< of the session; 0: none yet
   Counter accepted;                          ///< frames taken from it
@@ -34,8 +34,8 @@ struct SessionCounts {
   std::uint64_t dropped = 0;
 };
 
-/// What a shard lets others know of each of its sessions. Thread safety: counts() by who gives out
-/// the slots, everything else by the shard. Limits: slots from `slots` on read as 0.
+/// Lets others read the state of each session of a shard. Thread safety: counts() from the thread
+/// that gives out the slots, the rest from the shard. Limits: slots from `slots` on read as 0.
 class SessionGauges {
  public:
   explicit SessionGauges(std::size_t slots)
@@ -57,7 +57,7 @@ class SessionGauges {
     counters.generation.store(generation, std::memory_order_release);
     return counters;
   }
-  /// How many bytes wait for the slot's session.
+  /// Sets the bytes that wait for the slot's session.
   void set_queued(ConnectionSlot slot, std::uint64_t bytes) {
     if (!queued_ || slot.value() >= slots_) return;
     // The 0 of a session that begins or ends would make its page memory of its own.

@@ -61,7 +61,7 @@ bool take_value(Cursor& cursor, bitestream_value* value) {
   return cursor.skip(value->size);
 }
 
-/// What is decided by one look, so that a step stays O(1).
+/// Checks what one look can decide, so that a step stays O(1).
 bool legal_at_depth(const bitestream_value& value, std::uint32_t depth) {
   if (value.type == BITESTREAM_BOOL) return value.bytes[0] <= 1;
   return value.type != BITESTREAM_NESTED || depth < BITESTREAM_DEPTH_MAX;

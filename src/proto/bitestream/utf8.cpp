@@ -3,8 +3,8 @@
 namespace gimnet::proto::bitestream {
 namespace {
 
-/// What a leading byte asks of its followers: how many there are, and the range of the first one,
-/// by which RFC 3629 excludes overlong forms, surrogates and what is over U+10FFFF.
+/// The followers that a leading byte asks for: their number, and the range of the first one. By
+/// that range RFC 3629 excludes overlong forms, surrogates and codes over U+10FFFF.
 struct Sequence {
   std::size_t followers;
   unsigned char first_min;

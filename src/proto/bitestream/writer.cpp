@@ -104,7 +104,7 @@ void put(bitestream_writer* writer, const bitestream_key& key, Type type, const 
   writer->size += whole;
 }
 
-/// Where the content of the nested stream that starts at `start` begins, whose length field has 1
+/// The offset of the content of the nested stream that starts at `start`. Its length field has 1
 /// byte until it ends.
 std::size_t content_offset(const bitestream_writer* writer, std::size_t start) {
   const bool text_key = (writer->bytes[start] & kTextKeyBit) != 0;

@@ -119,7 +119,7 @@ class Writer {
     bitestream_put_value(&state_, key.raw(), type, bytes.data(), bytes.size());
   }
 
-  /// What is put between the two belongs to the nested stream.
+  /// Values that are put between the two calls belong to the nested stream.
   void begin_nested(Key key) { bitestream_begin_nested(&state_, key.raw()); }
   void end_nested() { bitestream_end_nested(&state_); }
 

@@ -19,8 +19,7 @@ std::optional<ControlView> split_control(std::span<const std::byte> payload) {
 }
 
 Payload assemble_control(ControlHeader header, const bitestream::Writer& body) {
-  // What the structs write is within the limits of Bitestream; anything else is a mistake in this
-  // program.
+  // The structs write within the limits of Bitestream; anything else is a mistake in this program.
   GIMNET_CHECK(body.finish() == BITESTREAM_OK);
   Payload payload(kControlHeaderSize + body.size());
   store_le(payload.data(), header.operation);

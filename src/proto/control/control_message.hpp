@@ -13,7 +13,7 @@
 #include "proto/bitestream/writer.hpp"
 #include "proto/control/fields.hpp"
 
-// What all payloads of kinds 16 and up have in common: {u16 operation, u16 request number} and a
+// The common form of all payloads of kinds 16 and up: {u16 operation, u16 request number} and a
 // Bitestream with integer keys (docs/protocol.md, sections 3, 8 and 9). The messages themselves are
 // structs in link.hpp, ns.hpp and ctrl.hpp; each has
 //

@@ -118,8 +118,8 @@ struct Connections {
   friend bool operator==(const Connections&, const Connections&) = default;
 };
 
-/// What waits for a node now, and what it came to since its session began; but for the first, what
-/// the shards count under the same names. 0 of a hub that does not tell.
+/// The bytes that wait for a node now, and the counts of its session since it began, which the
+/// shards count under the same names. 0 if the hub does not tell.
 struct ConnectionCounts {
   std::uint64_t queued_bytes = 0;
   std::uint64_t accepted = 0;  ///< frames from it
@@ -153,7 +153,7 @@ struct ConnectionsAnswer {
   friend bool operator==(const ConnectionsAnswer&, const ConnectionsAnswer&) = default;
 };
 
-// What follows changes the hub: for administrators only, `denied` to everybody else.
+// The operations that follow change the hub. To all but administrators they are `denied`.
 
 // KICK: ends a node's session, its connection with GOODBYE `kicked`
 

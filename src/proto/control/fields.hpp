@@ -20,8 +20,8 @@ inline constexpr std::uint32_t kSentenceKey = 2;
 inline constexpr std::uint32_t kLearningKey = 5;
 
 inline constexpr std::size_t kSentenceBytesMax = 1024;
-/// What is written of a name or pattern: more than any may have, so that one that is too long is
-/// refused, and not cut to another one.
+/// So many bytes of a name or pattern are written at most. That is more than any may have, so a
+/// name that is too long is refused and not cut to another one.
 inline constexpr std::size_t kWrittenNameBytesMax = 1024;
 inline constexpr std::size_t kDescriptionBytesMax = 256;
 inline constexpr std::size_t kTokenBytesMax = 128;

@@ -13,7 +13,7 @@
 #include "proto/control/hub_identity.hpp"
 #include "proto/frame/frame_header.hpp"
 
-// How a connection begins and ends: the opening bytes, HELLO, WELCOME and GOODBYE
+// The beginning and end of a connection: the opening bytes, HELLO, WELCOME and GOODBYE
 // (docs/protocol.md, section 3). Encode and decode with encode() and decode<>() of
 // control_message.hpp. Thread safety: value types and pure functions.
 
@@ -149,7 +149,7 @@ enum class GoodbyeCode : std::uint16_t {
   id_taken = 19,
   copied = 20,
 };
-/// How many codes there are; they are counted from 0 without a gap.
+/// The number of codes, which are counted from 0 without a gap.
 inline constexpr std::size_t kGoodbyeCount = 21;
 /// The code as documents and tools print it, for example "name_taken".
 [[nodiscard]] const char* goodbye_name(GoodbyeCode code);

@@ -13,7 +13,7 @@ namespace gimnet::proto {
 inline constexpr std::size_t kNameBytesMax = 255;
 inline constexpr std::size_t kNamePartsMax = 16;
 
-/// What is wrong with a name, as a clause for a sentence ("it is empty"); nullptr: nothing is.
+/// The fault of a name, as a clause for a sentence ("it is empty"); nullptr: there is none.
 [[nodiscard]] const char* name_fault(std::string_view name);
 [[nodiscard]] inline bool valid_name(std::string_view name) { return name_fault(name) == nullptr; }
 /// The same of a node's name, which besides must not read as an id does (`7.17`): whoever sends

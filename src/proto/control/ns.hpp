@@ -255,7 +255,7 @@ struct Subscribe {
   friend bool operator==(const Subscribe&, const Subscribe&) = default;
 };
 
-/// What a service is at the moment, as its subscribers are told.
+/// The present state of a service, as its subscribers are told.
 struct ServiceState {
   GroupId group;              ///< 0: none
   NodeId provider;            ///< 0: nobody
@@ -311,7 +311,7 @@ struct ServiceMoved : ServiceState {
   friend bool operator==(const ServiceMoved&, const ServiceMoved&) = default;
 };
 
-/// How many subscribers a service has now, told to its provider.
+/// Tells a provider the present number of its service's subscribers.
 struct Subscribers {
   static constexpr std::uint16_t kOperation = request_of(Operation::subscribers);
   static constexpr const char* kName = "SUBSCRIBERS";

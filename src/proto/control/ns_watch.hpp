@@ -11,7 +11,7 @@
 
 namespace gimnet::proto::ns {
 
-/// What a watch is about: a set of bits.
+/// The subjects of a watch: a set of bits.
 enum WatchSubjects : std::uint8_t { kWatchNodes = 1, kWatchServices = 2, kWatchAll = 3 };
 
 // WATCH: tell me what there is under that pattern, and what changes. Again under the same number:
@@ -93,7 +93,7 @@ enum class ChangeKind : std::uint8_t {
   withdrawn = 10,  ///< of the record only group id, name and node id
 };
 
-/// What is told of one node or one service.
+/// News of one node or one service.
 struct Change {
   ChangeKind kind = ChangeKind::begin;  ///< as sent: may be a value that is not listed
   std::uint64_t version = 0;            ///< of the hub's names and services after this change

@@ -36,7 +36,7 @@ bool Pattern::matches(std::string_view name) const {
   return ((states >> count_) & 1u) != 0;
 }
 
-/// Where `**` is next, it may also stand for no part at all.
+/// `**` may also stand for no part at all.
 Pattern::States Pattern::skip_many(States states) const {
   for (std::size_t i = 0; i < count_; ++i) states |= (states & many_ & (1u << i)) << 1;
   return states;

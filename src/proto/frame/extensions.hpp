@@ -7,10 +7,10 @@
 
 #include "base/ids.hpp"
 
-// What stands between a frame's header and its payload when EXT is set (docs/protocol.md, section
-// 2). All functions take the extensions without the u16 in front that counts them, as FrameView
-// gives them; TRACE or AGE of a wrong size count as unknown: they are carried and not looked at.
-// Thread safety: pure functions on the caller's bytes.
+// The extensions between a frame's header and its payload if EXT is set (docs/protocol.md, section
+// 2). All functions take them without the u16 in front that counts their bytes, as FrameView gives
+// them. TRACE or AGE of a wrong size count as unknown: they are carried and not looked at. Thread
+// safety: pure functions on the caller's bytes.
 
 namespace gimnet::proto {
 
@@ -118,7 +118,7 @@ class ExtensionWriter {
   [[nodiscard]] bool add_age(const Age& age);
   /// A TRACE with free slots for `slots` hubs, 1..kTraceSlotsMax.
   [[nodiscard]] bool add_trace(std::size_t slots);
-  /// What was written: the `extensions` of FrameParts.
+  /// The bytes written so far: the `extensions` of FrameParts.
   [[nodiscard]] std::span<const std::byte> written() const { return memory_.first(size_); }
 
  private:

@@ -48,7 +48,7 @@ struct Credit {
   friend constexpr bool operator==(const Credit&, const Credit&) = default;
 };
 
-/// What PAUSE and RESUME are about.
+/// The subject of PAUSE and RESUME.
 struct Target {
   Kind kind = Kind::unicast;
   Lane lane = Lane::normal;

@@ -6,7 +6,7 @@
 
 #include "base/check.hpp"
 
-// How a sender cuts a message (docs/protocol.md, section 6).
+// Cuts the messages of a sender into fragments (docs/protocol.md, section 6).
 // Thread safety: value types.
 
 namespace gimnet::proto {

@@ -70,7 +70,7 @@ struct FrameHeader {
 };
 static_assert(sizeof(FrameHeader) == kHeaderSize);
 
-// Where a header has them, for who looks at a few of its bytes only.
+// The offsets of fields in a header, for code that looks at a few of its bytes only.
 inline constexpr std::size_t kDstOffset = offsetof(FrameHeader, dst);
 inline constexpr std::size_t kSrcOffset = offsetof(FrameHeader, src);
 inline constexpr std::size_t kKindOffset = offsetof(FrameHeader, kind);
@@ -103,7 +103,7 @@ inline void store_header(std::byte* bytes, const FrameHeader& header) {
   std::memcpy(bytes, &header, kHeaderSize);
 }
 
-/// What became of a frame that was not delivered: the closed list of docs/protocol.md, section 5.
+/// The reasons why a frame was not delivered: the closed list of docs/protocol.md, section 5.
 /// `not_retained` is of REPORTs only: such a frame is delivered all the same.
 enum class DropReason : std::uint8_t {
   none = 0,

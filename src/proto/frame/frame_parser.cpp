@@ -15,7 +15,7 @@ HeaderWords load_words(const std::byte* header) {
   return words;
 }
 
-/// What of the frame has not been taken apart yet.
+/// The part of a frame that has not been taken apart yet.
 class Rest {
  public:
   explicit Rest(std::span<const std::byte> bytes) : bytes_(bytes) {}

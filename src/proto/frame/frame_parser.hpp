@@ -162,8 +162,8 @@ inline constexpr std::size_t kRunBytesMax = 64 * 1024;
           0};
 }
 
-/// Who sent the frame: what a hub sends may have hops and reserved flags, and LIST comes with dst 0
-/// and without ids.
+/// The sender of a frame. A frame of a hub may have hops and reserved flags, and its LIST comes
+/// with dst 0 and without ids.
 enum class Origin : std::uint8_t { node, hub };
 
 /// The rules for a frame of a node that its 16 bytes alone can break: reserved bits, hops, kind,

@@ -15,7 +15,7 @@
 #include "proto/frame/fragmenter.hpp"
 #include "proto/frame/frame_header.hpp"
 
-// How a receiver puts messages together again (docs/protocol.md, section 6).
+// Puts a receiver's messages together again (docs/protocol.md, section 6).
 
 namespace gimnet::proto {
 
@@ -27,7 +27,7 @@ struct ReassemblyLimits {
   std::uint32_t streams_max = 256;  ///< streams that are remembered, each with at most one message
 };
 
-/// What became of one fragment.
+/// The result of one fragment.
 struct Reassembled {
   enum class State : std::uint8_t {
     part,       ///< taken; more is to come
@@ -59,8 +59,8 @@ class Reassembler {
   /// REQUIRES: message_bytes_max <= kMessageBytesMax and <= waiting_bytes_max, streams_max >= 1.
   explicit Reassembler(const ReassemblyLimits& limits = {});
 
-  /// Where a limit is reached, the source that holds most of the room loses what waited longest for
-  /// its next fragment.
+  /// If a limit is reached, the source that holds most of the room loses the message that waited
+  /// longest for its next fragment.
   /// REQUIRES: the fragment fits its own total, as parse_frame() checks.
   /// `aligned_at`: of a first fragment, the byte of the message that shall be aligned (ByteBuffer).
   [[nodiscard]] Reassembled take(const FragmentStream& stream, const FragmentHeader& fragment,

@@ -14,8 +14,8 @@
 
 namespace gimnet::proto {
 
-/// What a sender may have under way before the first TAKEN, and what a receiver allows unless it
-/// decides otherwise.
+/// The bytes that a sender may have under way before the first TAKEN, and that a receiver allows
+/// unless it decides otherwise.
 inline constexpr std::uint32_t kWindowDefault = 1024 * 1024;
 
 /// The sender's side, one per message.
@@ -72,7 +72,7 @@ class ReceiveWindow {
   [[nodiscard]] bool due(std::uint32_t taken) const {
     return taken >= total_ || taken - told_ >= std::max(window_ / 4, 1u);
   }
-  /// What to tell it.
+  /// The TAKEN to send.
   [[nodiscard]] Taken tell(std::uint32_t taken) {
     told_ = taken;
     return current(taken);

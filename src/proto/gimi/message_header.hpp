@@ -80,7 +80,7 @@ struct MessageView {
 [[nodiscard]] std::uint32_t application_bytes(bool keyed, std::span<const std::byte> start,
                                               std::uint32_t size);
 
-/// What stands before the data: the header and, if `timestamp_ns` is given, an extension with it.
+/// The bytes before the data: the header and, if `timestamp_ns` is given, an extension with it.
 /// Sets the flag and `extension_bytes` of the header. Returns the size, 12 or 20.
 inline constexpr std::size_t kMessagePrefixMax = kMessageHeaderSize + kTimestampSize;
 std::size_t write_message_prefix(MessageHeader header, std::optional<std::int64_t> timestamp_ns,

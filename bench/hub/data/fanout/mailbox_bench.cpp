@@ -1,5 +1,5 @@
-// What it costs to hand a stretch of frames to another shard, on one thread: without the other
-// CPU's cache misses.
+// The cost of handing a stretch of frames to another shard, on one thread: without the other CPU's
+// cache misses.
 
 #include <benchmark/benchmark.h>
 

@@ -1,4 +1,4 @@
-// What it costs to forward one frame of 16 bytes, from a read buffer of 256 KiB as a shard sees it:
+// The cost of forwarding one frame of 16 bytes, from a read buffer of 256 KiB as a shard sees it:
 // parsed, routed, written. By how many nodes the hub has, and by how many of them one buffer speaks
 // to. The look-up itself is two array indexes and costs the same for any number of nodes: as many
 // instructions, and as much time where a buffer speaks to as many of them. What differs is what

@@ -20,7 +20,7 @@ ctrl::HubInfoAnswer hub_info(const HandlerContext& context) {
   return answer;
 }
 
-/// What is no shard's: those counters that are not 0.
+/// Adds the counters that belong to no shard and are not 0.
 void add_conductor(const HandlerContext& context, ctrl::StatisticsAnswer& answer) {
   ctrl::ShardRecord record;
   record.shard = ctrl::kConductorRecord;

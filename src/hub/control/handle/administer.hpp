@@ -12,7 +12,7 @@ namespace gimnet::hub {
 [[nodiscard]] proto::Payload handle_reload(HandlerContext& context, const Request& request);
 [[nodiscard]] proto::Payload handle_log_level(HandlerContext& context, const Request& request);
 
-/// What those get who may not change anything: `denied`, and how to be one who may.
+/// Answers `denied` with a sentence that explains how to become an administrator.
 [[nodiscard]] proto::Payload handle_denied(HandlerContext& context, const Request& request);
 
 }  // namespace gimnet::hub

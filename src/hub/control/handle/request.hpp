@@ -23,7 +23,7 @@
 
 namespace gimnet::hub {
 
-/// What a request may have done to the hub as a whole.
+/// Carries out the requests that are about the hub as a whole.
 class Administration {
  public:
   virtual ~Administration() = default;
@@ -36,7 +36,7 @@ class Administration {
   [[nodiscard]] virtual std::string keep_state(std::chrono::milliseconds now) = 0;
 };
 
-/// What handlers work on. Valid until: the handler returns.
+/// The parts of the hub that handlers work on. Valid until: the handler returns.
 struct HandlerContext {
   const HubFacts& facts;
   const Limits& limits;
@@ -92,7 +92,7 @@ template <class Message, class Grant>
   return context.names == nullptr || request.own_only ? nullptr : context.names->copies();
 }
 
-/// How much fits in one page of records.
+/// The room in one page of records.
 class PageBudget {
  public:
   PageBudget(const Limits& limits, std::uint32_t records_wanted);

@@ -27,8 +27,8 @@ proto::Refusal out_of_range(std::string_view what, const std::string& range,
                                                  " bounds it"};
 }
 
-/// What is wrong with how a service wants to be delivered. A limit that was lowered meanwhile holds
-/// for what is new: a service keeps the n that `standing` has, or it would be gone when its node
+/// Checks the delivery that a service wants. A limit that was lowered meanwhile holds for new
+/// services only: a service keeps the n that `standing` has, or it would be gone when its node
 /// comes back and repeats it.
 std::optional<proto::Refusal> fault_of(const Limits& limits, const ns::Advertise& offer,
                                        const ServiceTerms* standing) {

@@ -10,8 +10,8 @@
 #include "proto/control/link.hpp"
 #include "proto/control/ns_watch.hpp"
 
-// What the state machines want done, to be carried out in this order: tables first or messages
-// first is part of the meaning (docs/protocol.md, section 8).
+// The effects that the state machines ask for, to be carried out in their order: whether the table
+// or the message comes first is part of the meaning (docs/protocol.md, section 8).
 
 namespace gimnet::hub {
 
@@ -57,7 +57,7 @@ struct ServiceMoved {
   std::string full_name;
   bool joins = false;
 };
-/// What a subscriber asked for. 0: not. `number`: of its counts (docs/protocol.md, section 8).
+/// The wishes of a subscriber. 0: none. `number`: of its counts (docs/protocol.md, section 8).
 struct SubscriberTerms {
   std::uint32_t window = 0;
   std::uint32_t depth = 1;

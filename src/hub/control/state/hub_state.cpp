@@ -65,7 +65,7 @@ bool read_head(std::span<const std::byte> file, HubState& state) {
          is_index(state.node_mark) && is_index(state.group_mark);
 }
 
-/// What newcomers of the next start may be given, and what is kept of that before.
+/// The indices that newcomers of the next start may be given. Marks all earlier ones as used.
 IndexRange begin(std::uint32_t& mark, IndexSet& used) {
   IndexRange range{mark, 0, used};
   IndexPool::Grant grant = IndexPool(kIndexMost, {}, range, std::chrono::milliseconds::max())

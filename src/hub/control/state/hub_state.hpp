@@ -13,8 +13,8 @@
 #include "hub/control/state/index_pool.hpp"
 #include "hub/control/state/session_token.hpp"
 
-// What a hub keeps over its restarts, and the bytes of the file that it is kept in:
-// docs/operations.md, "State". Thread safety: value types and pure functions.
+// The state that a hub keeps over its restarts, and the bytes of the file that it is kept in
+// (docs/operations.md, "State"). Thread safety: value types and pure functions.
 
 namespace gimnet::hub {
 
@@ -52,9 +52,9 @@ struct HubStart {
   IndexRange nodes{};
   IndexRange groups{};
 };
-/// How the hub goes on from what it found: the next boot number, unused node indices from the mark
-/// on, all of them kept as used, the next block of group indices, without the kicked ones whose
-/// tokens have expired by `wall` (since 1970). Errors: the boot number is at its end.
+/// Goes on from the state that was found: the next boot number, unused node indices from the mark
+/// on, all of them kept as used, and the next block of group indices. Kicked nodes whose tokens
+/// have expired by `wall` (since 1970) are forgotten. Errors: the boot number is at its end.
 [[nodiscard]] Result<HubStart> next_start(const HubState& found, std::chrono::milliseconds wall);
 
 /// Never 0, and another one at each start, also of a hub that keeps nothing.

@@ -107,8 +107,8 @@ IndexPool::Grant IndexPool::next_grant(std::chrono::milliseconds now) const {
   next.used = next.forgets_gone ? taken_ : used_;
   next.count = position_;
   std::uint64_t left = 0;
-  // What was granted stays so. Beyond it no further than to the last one that is not used: the
-  // others may be forgotten one day, and are not granted then.
+  // Granted indices stay granted. More are granted up to the last one that is not used: the used
+  // ones behind it may be forgotten one day, and must not be granted before.
   std::uint64_t most = next.forgets_gone            ? kBlock
                        : granted_left_ < kBlock / 2 ? granted_left_ + kBlock
                                                     : granted_left_;

@@ -12,7 +12,7 @@
 
 namespace gimnet::hub {
 
-/// How long an index rests: until no frame to its former holder can wait in this hub.
+/// The time for which an index rests: until no frame to its former holder can wait in this hub.
 [[nodiscard]] std::chrono::milliseconds index_resting_time(const Limits& limits);
 
 /// From where a pool hands out indices to newcomers: `count` of them from `first` on, cyclically,
@@ -37,7 +37,7 @@ struct IndexRange {
 /// (NodeIndex, GroupIndex) where they leave it.
 class IndexPool {
  public:
-  /// What is granted at a time.
+  /// So many indices are granted at a time.
   static constexpr std::uint32_t kBlock = 4'096;
 
   /// REQUIRES: 0 < range.first <= most. Until `returns_until` those of before a restart may come
@@ -67,8 +67,8 @@ class IndexPool {
   /// Are there used ones that were not kept as used yet? A start that goes on from what was kept
   /// could hand them out.
   [[nodiscard]] bool unkept() const { return unkept_ && !keeps_nothing_; }
-  /// How long newcomers have to wait for those of before a restart, since all indices are used;
-  /// nothing: it is not that.
+  /// The time that newcomers have to wait for nodes of before a restart, since all indices are
+  /// used; nothing: that is not the reason.
   [[nodiscard]] std::optional<std::chrono::milliseconds> waits_for_returns(
       std::chrono::milliseconds now) const;
 
@@ -77,7 +77,7 @@ class IndexPool {
   /// Why nobody can be given an index now, as a sentence; `kind` names them ("node ids").
   [[nodiscard]] std::string shortage(const std::string& kind, std::chrono::milliseconds now) const;
 
-  /// What has to be kept where it outlives the hub, and what may be handed out then.
+  /// The indices to be kept where they outlive the hub, and those that may be handed out then.
   struct Grant {
     IndexSet used;            ///< what the next start must not hand out
     std::uint32_t mark = 1;   ///< from which it begins

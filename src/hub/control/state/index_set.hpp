@@ -21,7 +21,7 @@ class IndexSet {
 
   /// Index i is bit i % 8 of byte i / 8, and the last byte is not 0. Valid until: the set changes.
   [[nodiscard]] std::span<const std::byte> bytes() const;
-  /// What bytes() gave, of indices from 1 to `most`; nothing for any other bytes.
+  /// Reads what bytes() gave, of indices from 1 to `most`; nothing for any other bytes.
   [[nodiscard]] static std::optional<IndexSet> from_bytes(std::span<const std::byte> bytes,
                                                           std::uint32_t most);
   /// The longest that bytes() can be for indices up to `most`.

@@ -34,8 +34,8 @@ std::optional<Listed<Index>> list_by_name(const ByName& by_name,
     const Index index = wanted(entry.second);
     if (index > request.after) found.push_back(index);
   };
-  // What only begins with the same letters, as hall-30 does for hall-3/*, may be any number of
-  // names.
+  // Any number of names may begin with the same letters and not match, as hall-30 does for
+  // hall-3/*.
   if (const auto exact = by_name.find(beginning); exact != by_name.end()) {
     if (work == 0) return std::nullopt;
     look_at(*exact);

@@ -211,8 +211,8 @@ std::optional<proto::Refusal> Membership::renumber(Session& session, NodeIndex i
   // The new id leads to the node before the old one says that it moved.
   effects.emplace_back(NodeChanged{index});
   effects.emplace_back(NodeChanged{former});
-  // Who hears of the new id may send to it at once: by then no frame goes to the connection on
-  // which the node has the old one.
+  // A node that hears of the new id may send to it at once. By then no frame goes to the connection
+  // on which this node has the old one.
   effects.emplace_back(RenumberDue{session.place, former, index,
                                    "an administrator gave this node the id " +
                                        to_string(sessions_.node_id(session)) +

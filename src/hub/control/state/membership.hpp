@@ -27,7 +27,7 @@ struct Durable {
   std::vector<SessionToken> kicked;
 };
 
-/// What a HELLO asks for, and who sent it.
+/// The request of a HELLO, and its sender.
 struct JoinRequest {
   proto::Role role{};
   std::string name;                  ///< "": none, or the one that the session has
@@ -43,9 +43,9 @@ struct JoinRequest {
   NodeId former;  ///< the id that the node had; at this hub or another one; 0: none
 };
 
-/// Who belongs to this hub, under which name, with which services: the state of one hub without its
-/// neighbours. Makes sure that sessions, names and services agree with each other. Thread safety:
-/// none. Time and randomness are arguments; what is to be done comes back as effects.
+/// The state of one hub without its neighbours: its nodes, their names and services. Makes sure
+/// that sessions, names and services agree with each other. Thread safety: none. Time and
+/// randomness are arguments; the effects that it returns are to be carried out.
 class Membership {
  public:
   Membership(const Sessions::Options& options, const Limits& limits);
@@ -61,7 +61,7 @@ class Membership {
                                                     std::chrono::milliseconds now,
                                                     Effects& effects);
 
-  /// How a connection ended.
+  /// The end of a connection.
   struct Ending {
     bool said_by_peer = false;
     proto::GoodbyeCode code{};
@@ -94,9 +94,9 @@ class Membership {
                                                        std::chrono::milliseconds now,
                                                        Effects& effects, const KeepNow& keep = {});
 
-  /// What has to outlive the hub. A StateDue among the effects asks to keep it; a newcomer gets
-  /// none of the indices that were not granted by state_kept() or at the start, so that no crash
-  /// makes two nodes of one id.
+  /// The state that has to outlive the hub. A StateDue among the effects asks to keep it. A
+  /// newcomer gets only indices that state_kept() or the start granted, so that no crash makes two
+  /// nodes of one id.
   [[nodiscard]] Durable durable(std::chrono::milliseconds now) const;
   /// Is there reason to keep it although nothing happened that asks for it?
   [[nodiscard]] bool keeping_due(std::chrono::milliseconds now) const;

@@ -6,8 +6,8 @@
 
 namespace gimnet::hub {
 
-/// Where a session lives: its shard, its slot there, and which of the slot's holders it is (never
-/// 0).
+/// The place of a session: its shard, its slot there, and its number among the slot's holders
+/// (never 0).
 struct Place {
   ShardIndex shard;
   ConnectionSlot slot;

@@ -20,7 +20,7 @@
 
 namespace gimnet::hub {
 
-/// What a provider says of its service.
+/// The terms of a service, as its provider gives them.
 struct ServiceTerms {
   std::uint32_t message_type = 0;
   std::uint32_t instance = 0;
@@ -76,7 +76,7 @@ struct Topic {
   [[nodiscard]] std::uint32_t subscriber_count() const {
     return static_cast<std::uint32_t>(subscribers.size()) + links;
   }
-  /// What the shards hold that subscriber to; nothing if it simply gets everything.
+  /// The pace that the shards keep for that subscriber; nothing if it gets everything.
   [[nodiscard]] std::optional<SubscriberTerms> pace_of(NodeIndex subscriber) const;
   /// In force; 0: the subscriber's messages are not counted.
   [[nodiscard]] std::uint32_t window_of(NodeIndex subscriber) const {
@@ -152,7 +152,7 @@ class Services {
 
   /// Grows with each ServiceMoved.
   [[nodiscard]] std::uint64_t changes() const { return changes_; }
-  /// What the node subscribed to and subscribers were told of since that change, the latest last.
+  /// The node's subscriptions that had news for subscribers since that change, the latest last.
   [[nodiscard]] std::vector<const Topic*> moved_since(NodeIndex node, std::uint64_t change) const;
   [[nodiscard]] std::vector<const Topic*> provided_by(NodeIndex node) const;
 
@@ -167,7 +167,7 @@ class Services {
   /// Services that somebody provides.
   [[nodiscard]] std::size_t provided() const { return groups_.size() - orphans_.size(); }
   [[nodiscard]] const Topics& by_name() const { return topics_; }
-  /// What the node declared of that service; nothing: it has not. The pointer holds until something
+  /// The terms that the node declared of that service; nullptr: it has not. Valid until: something
   /// changes here.
   [[nodiscard]] const ServiceTerms* provided(NodeIndex node, std::string_view full_name) const;
   [[nodiscard]] std::optional<SubscriberTerms> subscribed(NodeIndex node,
@@ -184,7 +184,7 @@ class Services {
     Topic* topic = nullptr;
     std::uint32_t life = 0;
   };
-  /// What one node declared; `life` counts its connections.
+  /// The declarations of one node; `life` counts its connections.
   struct Node {
     std::uint32_t life = 0;
     std::vector<Declared> provides;

@@ -3,7 +3,7 @@
 #include "hub/control/state/services.hpp"
 #include "proto/control/ns.hpp"
 
-// How names get group ids and providers, and lose them, and who hears of it.
+// Gives names their group ids and providers, takes them away, and tells those who follow them.
 
 namespace gimnet::hub {
 namespace {
@@ -35,7 +35,7 @@ void Services::enter_group(Topic& topic, const Service& service, milliseconds no
     effects.emplace_back(RetainedDropped{former->provider, former->group});
   topic.service = service;
   groups_[service.group] = &topic;
-  // Who is told may send at once to a group that accepts data.
+  // A node that is told may send at once to a group that accepts data.
   effects.emplace_back(GroupChanged{service.group});
   tell_subscribers(topic, effects, true);
   effects.emplace_back(service_noted(ChangeKind::advertised, topic));

@@ -13,8 +13,8 @@
 #include "hub/control/state/identity.hpp"
 #include "hub/crypto/hmac.hpp"
 
-// What a node shows to get its session back: docs/protocol.md, section 3. The layout is the hub's
-// own matter; to nodes a token is opaque. Thread safety: value types and pure functions.
+// The token that a node shows to get its session back (docs/protocol.md, section 3). The layout is
+// the hub's own matter; to nodes a token is opaque. Thread safety: value types and pure functions.
 
 namespace gimnet::hub {
 
@@ -57,7 +57,7 @@ inline constexpr std::uint64_t kBootMax = (1u << 24) - 1;
 /// The number before the first session of that start. REQUIRES: boot <= kBootMax.
 [[nodiscard]] SessionNumber first_number(std::uint64_t boot);
 
-/// What a token says in clear.
+/// The content of a token, which is not encrypted.
 struct SessionToken {
   NodeIndex index;                     ///< of the node id
   SessionNumber number = 0;            ///< of the session
@@ -78,7 +78,7 @@ inline constexpr std::size_t kSessionTokenBytes = 56;
 /// holder.
 [[nodiscard]] std::vector<std::byte> write_token(const SessionToken& token,
                                                  const TokenHolder& holder, const Secret& secret);
-/// What the bytes say, whoever wrote them; nothing if they are no token.
+/// Reads a token without a check of its MAC; nothing if the bytes are none.
 [[nodiscard]] std::optional<SessionToken> read_token(std::span<const std::byte> bytes);
 /// Did a hub with this secret write these bytes for that holder? Takes as long for a wrong MAC as
 /// for the right one.

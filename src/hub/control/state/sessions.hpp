@@ -73,14 +73,14 @@ class Crowds {
   Entries entries_;  ///< Limit: the sessions
 };
 
-/// Where a connection came from, as people read it: "tcp" and "127.0.0.1:41234", or "unix" and "pid
+/// The origin of a connection, as people read it: "tcp" and "127.0.0.1:41234", or "unix" and "pid
 /// 77 uid 1000".
 struct Origin {
   CompactText transport;
   CompactText address;
 };
 
-/// How the hub closed a connection.
+/// The end of a connection that the hub closed.
 struct Closing {
   proto::GoodbyeCode code{};
   std::string sentence;
@@ -115,7 +115,7 @@ struct Session {
   TokenBucket oddities;      ///< requests of no use
 };
 
-/// How people are told of a node: "node 7.17 'robot'".
+/// A node for people: "node 7.17 'robot'".
 [[nodiscard]] std::string title(NodeId node, const Session& session);
 
 enum class Placement : std::uint8_t { spread, hint };
@@ -150,7 +150,7 @@ class Sessions {
     return make_id(hub_, session.index);
   }
 
-  /// What a node shows to get its session back. REQUIRES: renew_token() was called for the session.
+  /// The token of a node's session. REQUIRES: renew_token() was called for the session.
   [[nodiscard]] std::vector<std::byte> token_of(const Session& session) const;
   /// The session's next token is for its present name and good for limits.token_ms from `wall`
   /// (since 1970) on.
@@ -163,7 +163,7 @@ class Sessions {
     Identity identity;                 ///< as the connection proves it
     std::chrono::milliseconds wall{};  ///< since 1970
   };
-  /// What a token is good for. Neither member set: it counts as none.
+  /// The rights that a token gives. Neither member set: it counts as none.
   struct Claim {
     Session* session = nullptr;  ///< that it is for
     std::optional<SessionToken>
@@ -207,7 +207,7 @@ class Sessions {
   [[nodiscard]] std::optional<std::chrono::milliseconds> returns_until() const {
     return returns_until_;
   }
-  /// How long that is still so. Not above 0: no longer.
+  /// The time for which that is still so. Not above 0: no longer.
   [[nodiscard]] std::chrono::milliseconds returns_expected_for(
       std::chrono::milliseconds now) const {
     return returns_until_ ? *returns_until_ - now : std::chrono::milliseconds{0};
@@ -259,7 +259,7 @@ class Sessions {
   [[nodiscard]] const IndexPool& indices() const { return indices_; }
 
  private:
-  /// Where a session went, and the number that its tokens had when it was there.
+  /// The index that a session moved to, and the number that its tokens had when it was there.
   struct Moved {
     NodeIndex index;
     SessionNumber number = 0;

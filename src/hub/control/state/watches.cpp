@@ -383,7 +383,7 @@ bool Watches::wants(const Watch& watch, const Journal::Note& note) {
   const GroupId* const group = std::get_if<GroupId>(&note.subject);
   if ((watch.subjects & (group != nullptr ? ns::kWatchServices : ns::kWatchNodes)) == 0)
     return false;
-  // What the snapshot has yet to look at, it will show as it is then.
+  // The snapshot will show the names that it has not reached yet as they are then.
   if (watch.phase == Phase::nodes && (node == nullptr || *node > watch.last_node)) return false;
   if (watch.phase == Phase::services && group != nullptr && *group > watch.last_group) return false;
   return fits(watch, note.name) || (!note.former_name.empty() && fits(watch, note.former_name));

@@ -14,10 +14,10 @@
 
 namespace gimnet::hub {
 
-/// Who watches which names and services, and how much of it each has been told. A watch is a place
-/// in the journal: one that fell off its end is told the present state from the start again. Each
-/// serve() does a bounded piece of work, and each node takes part in it in turn. Thread safety:
-/// none. Time is an argument. Limits: watches, watches_per_node, scan_records, watch_event_bytes,
+/// The watches of names and services, and how far each has been told. A watch is a place in the
+/// journal. A watch that fell off the journal's end is told the present state from the start again.
+/// Each serve() does a bounded piece of work, for one node after the other. Thread safety: none.
+/// Time is an argument. Limits: watches, watches_per_node, scan_records, watch_event_bytes,
 /// watch_window, watch_window_per_node.
 class Watches {
  public:
@@ -52,11 +52,11 @@ class Watches {
 
   [[nodiscard]] const Journal& journal() const { return journal_; }
   [[nodiscard]] std::size_t size() const { return watches_; }
-  /// How often a watch was so far behind that it had to begin again.
+  /// Counts the times that a watch was so far behind that it had to begin again.
   [[nodiscard]] std::uint64_t resyncs() const { return resyncs_; }
 
  private:
-  /// What a watch is told at the moment: the snapshot's nodes, its services, or changes alone.
+  /// The part that a watch is told now: the snapshot's nodes, its services, or changes alone.
   enum class Phase : std::uint8_t { begin, nodes, services, end, live };
   struct Watch {
     std::uint32_t number = 0;
@@ -110,7 +110,7 @@ class Watches {
   void add_service(const Topic& topic, Page& page) const;
   /// A node or a service of another hub.
   void add_other(const KnownName& known, Page& page) const;
-  /// What the snapshot is about next, behind the nodes or the services.
+  /// Moves the snapshot on, behind the nodes or the services.
   static void next_phase(Watch& watch);
   void add_mark(proto::ns::ChangeKind kind, Page& page) const;
   void add(const proto::ns::Change& change, Page& page) const;
