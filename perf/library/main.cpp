@@ -214,8 +214,6 @@ Findings send_bursts(LibraryClient& client, LibraryClient::Setup setup,
   serve(client);
 }
 
-constexpr StreamId kThere = 1;
-
 /// Sends a message, and the next when it has come back.
 class Pinger {
  public:
@@ -223,7 +221,7 @@ class Pinger {
       : client_(client), options_(options) {
     const auto pattern = pattern_payload(options.payload_bytes);
     payload_.assign(pattern.begin(), pattern.end());
-    inbox_.expect(kThere, options.payload_bytes);
+    inbox_.expect(kData, options.payload_bytes);
     client.open(setup, [this](std::span<const std::byte> message) { on_message(message); });
   }
 
@@ -249,7 +247,7 @@ class Pinger {
 
  private:
   void send_next() {
-    store_le(payload_.data(), make_stamp(kThere, sequence_++));
+    store_le(payload_.data(), make_stamp(kData, sequence_++));
     begin_ = Clock::now();
     client_.send(payload_);
   }
