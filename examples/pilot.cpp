@@ -16,7 +16,7 @@ int main(int argc, char** argv) try {
 
   const gimnet::Node node("pilot");
   const auto poses = node.subscribe("robot/pose").or_throw();
-  const auto pictures = node.subscribe("robot/camera").or_throw();
+  const auto pictures = node.subscribe("robot/camera", {.newest_only = true}).or_throw();
   if (!poses.wait_until_exists(gimnet::Timeout{5000})) {
     std::cerr << "pilot: there is no robot/pose: start robot first\n";
     return 1;

@@ -11,7 +11,7 @@
 int main(int argc, char** argv) try {
   const std::chrono::milliseconds work{argc > 1 ? std::atoi(argv[1]) : 500};
   const gimnet::Node node;
-  const auto images = node.subscribe("camera/images").or_throw();
+  const auto images = node.subscribe("camera/images", {.newest_only = true}).or_throw();
   for (;;) {
     const auto picture = images.receive().or_throw();
     std::cout << "picture " << picture.sequence() << ", " << picture.data().size() << " bytes, "

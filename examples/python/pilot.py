@@ -12,7 +12,7 @@ def main() -> None:
     end = time.monotonic() + (float(words[2]) if len(words) >= 3 else 5.0)
     with gimnet.connect("pilot") as node:
         poses = node.subscribe("robot/pose")
-        pictures = node.subscribe("robot/camera")
+        pictures = node.subscribe("robot/camera", newest_only=True)
         while time.monotonic() < end:
             # The robot stops by itself if commands no longer reach it, so each is sent again and again.
             try:

@@ -10,7 +10,7 @@ import gimnet
 def main() -> None:
     work = float(sys.argv[1]) / 1000 if len(sys.argv) > 1 else 0.5
     with gimnet.connect() as node:
-        images = node.subscribe("camera/images")
+        images = node.subscribe("camera/images", newest_only=True)
         for picture in images:  # picture.array("u1", (480, 640)) is a numpy array without a copy
             print(f"picture {picture.sequence}, {len(picture.data)} bytes, {images.missed} skipped", flush=True)
             time.sleep(work)

@@ -76,18 +76,20 @@ class Examples(unittest.TestCase):
         publisher.signal(signal.SIGKILL)
         publisher.wait()
 
-    def test_an_executor_and_a_poll_loop_talk(self):
-        hub = Hub(self)
-        start(self, hub, "executor")
-        hub.wait_for_node("robot")
-        loop = start(self, hub, "poll_loop", stdin=subprocess.PIPE)
-        wait_until(lambda: b"x 0.000000" in loop.out, f"a pose; it said: {loop.err}")
-        loop.popen.stdin.write(b"fast\n2\n")
-        loop.popen.stdin.flush()
-        wait_until(lambda: b"'fast' is no speed\n" in loop.out and b"speed 2.000000\n" in loop.out, "the replies")
-        wait_until(lambda: b"x 1." in loop.out, "a pose that moved")
-        loop.popen.stdin.close()
-        self.assertEqual(loop.wait(), 0, loop.err)
+    def test_programs_of_one_thread_talk(self):
+        for which, other in (("executor", "poll_loop.py"), ("wait_set.py", "poll_loop")):
+            with self.subTest(which):
+                hub = Hub(self)
+                start(self, hub, which)
+                hub.wait_for_node("robot")
+                loop = start(self, hub, other, stdin=subprocess.PIPE)
+                wait_until(lambda: b"x 0.000000" in loop.out, f"a pose; it said: {loop.err}")
+                for line, answer in ((b"fast\n", b"'fast' is no speed\n"), (b"2\n", b"speed 2.000000\n"), (b"", b"x 1.")):
+                    loop.popen.stdin.write(line)
+                    loop.popen.stdin.flush()
+                    wait_until(lambda: answer in loop.out, f"{answer}; it said: {loop.out} {loop.err}")
+                loop.popen.stdin.close()
+                self.assertEqual(loop.wait(), 0, loop.err)
 
     def test_a_kicked_publisher_ends(self):
         hub = Hub(self)
@@ -199,7 +201,7 @@ class Examples(unittest.TestCase):
     def test_without_a_hub_they_say_so(self):
         hub = Hub(self)
         hub.process.end()
-        for name in ("publisher", "subscriber", "adder", "ask", "robot", "pilot", "camera", "viewer", "mirror", "hello",
+        for name in ("publisher", "subscriber", "adder", "ask", "robot", "pilot", "camera", "viewer", "executor", "poll_loop", "mirror", "hello",
                      *(path.name for path in SCRIPTS.glob("*.py"))):
             with self.subTest(name=name):
                 process = start(self, hub, name)
