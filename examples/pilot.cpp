@@ -21,7 +21,7 @@ int main(int argc, char** argv) try {
     std::cerr << "pilot: there is no robot/pose: start robot first\n";
     return 1;
   }
-  const auto drive = node.sender_to_service("robot/drive").or_throw();
+  const auto drive = node.sender("robot/drive").or_throw();
   while (Clock::now() < end) {
     // The robot stops by itself if commands no longer reach it, so each is sent again and again.
     if (const auto sent = drive.send(command, gimnet::Timeout{100}); !sent)

@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
 """The reference of the Python package has all that is public, without a warning; what has no docstring is a warning."""
 
+import ast
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -42,6 +44,13 @@ class Reference(unittest.TestCase):
         for shown in ("class Node(", "subscribe(full_name: str, *, ", "subscribers: int", "class NotFound(", "connect(name: str="):
             self.assertIn(shown, page)
         self.assertNotIn("_handle", page)
+
+    def test_the_guide_names_all_that_is_public(self):
+        guide = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
+        package = ast.parse((ROOT / "python" / "gimnet" / "__init__.py").read_text(encoding="utf-8"))
+        names = next(ast.literal_eval(one.value) for one in package.body if isinstance(one, ast.Assign))
+        self.assertGreater(len(names), 40)
+        self.assertEqual([name for name in names if not re.search(rf"\b{name}\b", guide)], [])
 
     def test_each_gap_is_a_warning(self):
         package = self.folder / "package"
