@@ -60,7 +60,7 @@ class Executor {
     return add(source, [source, callback = std::move(callback)]() mutable {
       auto got = source.receive(kNoWait);
       if (got) callback(std::move(*got));
-      return got.ok() || got.is(Status::timeout);
+      return got.ok() || !has_ended(got.failure().status);
     });
   }
   /// Calls `callback(Reply)` with the end of a request.
@@ -146,6 +146,11 @@ class Executor {
     const std::int32_t before_;
   };
 
+  /// Nothing more comes: other failures pass.
+  [[nodiscard]] static bool has_ended(Status status) {
+    return status == Status::closed || status == Status::refused ||
+           status == Status::not_connected || status == Status::forked;
+  }
   template <class Source, class Call>
   Added add(const Source& source, Call call) {
     const auto added = set_.add(source, last_ + 1);

@@ -162,6 +162,16 @@ inline gimi_status bad_lane(gimi_lane lane) {
   return fail(GIMI_BAD_ARGUMENT, "there is no lane " + std::to_string(lane));
 }
 
+/// False: a queue cannot do that when it is full.
+inline bool read_at_full(gimi_at_full_queue number, AtFullQueue& at_full) {
+  at_full = static_cast<AtFullQueue>(number);
+  return number >= GIMI_OVERWRITE_OLDEST && number <= GIMI_STOP_READING;
+}
+
+inline gimi_status bad_at_full() {
+  return fail(GIMI_BAD_ARGUMENT, "at_full is none of GIMI_OVERWRITE_OLDEST, GIMI_STOP_READING");
+}
+
 /// Copies as much as fits, cut between characters. REQUIRES: size is not 0.
 inline void copy_text(std::string_view text, char* buffer, std::size_t size) {
   const std::string_view kept = nif::cut_text(text, size - 1);

@@ -74,7 +74,8 @@ gimi_status gimi_queue(gimi_handle node, gimi_key key, const gimi_queue_options*
       return give<QueueObject>(queue, found.core, found.core->inbox().queue(key_of(key), nullptr));
     }
     return with_options(options, "make a queue", "gimi_queue_options", [&](const auto& given) {
-      const QueueOptions how{given.messages, static_cast<AtFullQueue>(given.at_full)};
+      QueueOptions how{given.messages};
+      if (!read_at_full(given.at_full, how.at_full)) return bad_at_full();
       return give<QueueObject>(queue, found.core, found.core->inbox().queue(key_of(key), &how));
     });
   });

@@ -77,7 +77,8 @@ gimi_status gimi_accept(gimi_handle node, const char* name, const gimi_accept_op
         return fail(GIMI_BAD_ARGUMENT, "this version of the library has no lease of a service");
       AcceptOptions how;
       how.key = key_of(given.key);
-      how.queue = {given.messages, static_cast<AtFullQueue>(given.at_full)};
+      how.queue.messages = given.messages;
+      if (!read_at_full(given.at_full, how.queue.at_full)) return bad_at_full();
       how.metadata = text_of(given.metadata);
       Core& core = *found.core;
       MessageQueue& made = core.inbox().queue(how.key, &how.queue);

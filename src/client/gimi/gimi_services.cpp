@@ -180,7 +180,7 @@ gimi_status gimi_subscribe(gimi_handle node, const char* full_name,
       how.rate_hz = given.rate_hz;
       how.newest_only = given.newest_only != 0;
       how.queue = given.queue;
-      how.at_full = static_cast<AtFullQueue>(given.at_full);
+      if (!read_at_full(given.at_full, how.at_full)) return bad_at_full();
       how.timeout = timeout_in_options(given.timeout_ms);
       how.window = given.window;
       how.depth = given.depth;
