@@ -116,6 +116,14 @@ class Waiting(unittest.TestCase):
             else:
                 self.assert_readable(subscription, False)
 
+    def test_silence_ends_a_wait(self):
+        subscription = self.viewer.subscribe("robot/nothing", silence=0.02)
+        with self.assertRaises(gimnet.Silence):
+            subscription.receive()
+        self.assert_readable(subscription, patience=PATIENCE_S)
+        with self.assertRaises(gimnet.Silence):
+            subscription.receive(0)
+
     def test_asyncio_waits_by_the_descriptor(self):
         publisher, subscription = self.pair("pose")
 

@@ -51,7 +51,7 @@ struct Source : Object {
       : core(std::move(the_core)), queue(the_queue) {}
   void end() override { core->inbox().leave(queue, closed); }
   bool visit_source(const SourceVisitor& visitor) override {
-    core->inbox().visit(queue, visitor);
+    if (core->inbox().visit(queue, visitor)) core->attend();
     return true;
   }
   const SharedCore core;

@@ -8,6 +8,7 @@
 
 #include "base/clock.hpp"
 #include "base/signals_blocked.hpp"
+#include "client/gimi/inbox.hpp"
 #include "client/gimi/open_requests.hpp"
 #include "client/gimi/stream_table.hpp"
 
@@ -167,8 +168,9 @@ void Clerk::run() {
     tick_at = now + kTickNs;
     const bool streams = streams_.tick(now);
     const bool requests = requests_ != nullptr && requests_->tick(now);
+    const bool silences = inbox_ != nullptr && inbox_->tick();
     const MutexLock lock(mutex_);
-    if (!streams && !requests && !hurry_) ticking_ = false;
+    if (!streams && !requests && !silences && !hurry_) ticking_ = false;
   }
 }
 

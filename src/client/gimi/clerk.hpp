@@ -60,17 +60,19 @@ class AckBook {
   std::map<StreamName, Entry> entries_;
 };
 
+class Inbox;
 class OpenRequests;
 class StreamTable;
 
 /// A node's own thread: acknowledges what was taken, one ACK for as many messages as came
-/// meanwhile, lets streams ask for the ACKs that they miss, and sends requests again. It sleeps
-/// while there is nothing to do. Thread safety: any thread.
+/// meanwhile, lets streams ask for the ACKs that they miss, sends requests again, and tells wait
+/// sets of silence. It sleeps while there is nothing to do. Thread safety: any thread.
 class Clerk {
  public:
-  /// `requests` may be null.
-  Clerk(Uplink& uplink, StreamTable& streams, OpenRequests* requests = nullptr)
-      : uplink_(uplink), streams_(streams), requests_(requests) {}
+  /// `requests` and `inbox` may be null.
+  Clerk(Uplink& uplink, StreamTable& streams, OpenRequests* requests = nullptr,
+        Inbox* inbox = nullptr)
+      : uplink_(uplink), streams_(streams), requests_(requests), inbox_(inbox) {}
 
   void start();
   /// Sends the ACKs that are due, and ends the thread. REQUIRES: not from the clerk's own thread.
@@ -104,6 +106,7 @@ class Clerk {
   Uplink& uplink_;
   StreamTable& streams_;
   OpenRequests* const requests_;
+  Inbox* const inbox_;
   std::thread thread_;
 
   Mutex mutex_;

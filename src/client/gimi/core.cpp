@@ -60,7 +60,7 @@ Core::Core(const NodeOptions& options)
       watches_(uplink_),
       requests_(uplink_, [this] { clerk_.attend(true); }),
       answers_(uplink_),
-      clerk_(uplink_, streams_, &requests_),
+      clerk_(uplink_, streams_, &requests_, &inbox_),
       reception_(
           {uplink_, inbox_, streams_, services_, pings_, requests_, answers_, clerk_, losses_},
           options.message_bytes_max) {}

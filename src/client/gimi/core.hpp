@@ -44,6 +44,8 @@ class Core {
   [[nodiscard]] WatchTable& watches() { return watches_; }
   [[nodiscard]] OpenRequests& requests() { return requests_; }
   [[nodiscard]] AnswerTable& answers() { return answers_; }
+  /// Something is to be looked after at certain times.
+  void attend() { clerk_.attend(true); }
   [[nodiscard]] LostCounts lost() const;
   [[nodiscard]] Outcome<TracedPing> ping(Peer to, Timeout timeout, Lane lane, BytesView echo,
                                          bool traced);

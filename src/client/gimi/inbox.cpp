@@ -175,9 +175,21 @@ void Inbox::count(MessageQueue& queue, bool filled) {
   any_source_.update(filled_ != 0 || has_ended);
 }
 
-void Inbox::visit(MessageQueue& queue, const SourceVisitor& visitor) {
+bool Inbox::visit(MessageQueue& queue, const SourceVisitor& visitor) {
   const MutexLock lock(mutex_);
   visitor(queue.source(), !queue.empty() || end_);
+  return queue.silent_at_ns() != INT64_MAX && queue.source().is_member();
+}
+
+bool Inbox::tick() {
+  const MutexLock lock(mutex_);
+  bool more = false;
+  for (MessageQueue& queue : queues_) {
+    if (queue.silent_at_ns() == INT64_MAX || !queue.source().is_member()) continue;
+    more = true;
+    if (is_over(queue.silent_at_ns())) queue.source().update(true);
+  }
+  return more && !end_;
 }
 
 void Inbox::visit_any(const SourceVisitor& visitor) {
@@ -219,6 +231,7 @@ Outcome<Message> Inbox::receive(MessageQueue& queue, Timeout timeout,
       if (end_) return end_.failure("receive");
       if (left != nullptr && *left) return Failure{Status::closed, "the handle was closed"};
       if (queue.tells_silence()) {
+        queue.source().update(false);
         return Failure{Status::silence,
                        "nothing came for " + std::to_string(queue.silence_ms()) + " ms"};
       }

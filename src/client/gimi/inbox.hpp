@@ -69,8 +69,12 @@ class Inbox {
   [[nodiscard]] bool put(MessageKey key, Message& message, Receipt* receipt)
       GIMNET_EXCLUDES(mutex_);
   /// A WaitSet waits for a message here: of that queue, or of any.
-  void visit(MessageQueue& queue, const SourceVisitor& visitor) GIMNET_EXCLUDES(mutex_);
+  /// True: tick() has to be called.
+  [[nodiscard]] bool visit(MessageQueue& queue, const SourceVisitor& visitor)
+      GIMNET_EXCLUDES(mutex_);
   void visit_any(const SourceVisitor& visitor) GIMNET_EXCLUDES(mutex_);
+  /// Tells wait sets of queues that are silent. False: none of a set expects messages.
+  [[nodiscard]] bool tick() GIMNET_EXCLUDES(mutex_);
   void count_dropped() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::uint64_t dropped() GIMNET_EXCLUDES(mutex_);
 

@@ -52,7 +52,7 @@ TEST_F(ExecutorTest, AWaitSetTellsOfEachKindOfMember) {
   EXPECT_EQ(seen.receive(kNoWait)->text(), "x");
   EXPECT_TRUE(set_.wait(kNoWait).is(Status::timeout));
 
-  viewer_.sender_to_service("robot/drive").or_throw().send("left").or_throw();
+  viewer_.send("robot/drive", "left").or_throw();
   EXPECT_EQ(set_.wait(kWait).or_throw(), Users{2});
   EXPECT_TRUE(drive.try_receive());
 
@@ -97,6 +97,15 @@ TEST_F(ExecutorTest, ARequestThatNobodyAnswersIsTold) {
   set_.add(pending, 1).or_throw();
   EXPECT_EQ(set_.wait(kWait).or_throw(), Users{1});
   EXPECT_TRUE(pending.wait(kNoWait)->is(Status::timeout));
+}
+
+TEST_F(ExecutorTest, SilenceIsTold) {
+  const auto seen = viewer_.subscribe("robot/a", {.silence = Timeout{20}}).or_throw();
+  set_.add(seen, 1).or_throw();
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_EQ(set_.wait(kWait).or_throw(), Users{1});
+    EXPECT_TRUE(seen.receive(kNoWait).is(Status::silence));
+  }
 }
 
 TEST_F(ExecutorTest, AForeignLoopWaitsByADescriptor) {

@@ -251,7 +251,8 @@ class WaitSetOfANodeTest : public WaitSetTest {
 
 TEST_F(WaitSetOfANodeTest, AQueueIsReadyWhileItHasMessages) {
   put({1, 0});
-  EXPECT_TRUE(join(set_, [&](const SourceVisitor& visitor) { inbox_.visit(queue_, visitor); }));
+  EXPECT_TRUE(join(
+      set_, [&](const SourceVisitor& visitor) { EXPECT_FALSE(inbox_.visit(queue_, visitor)); }));
   EXPECT_TRUE(join(any_, [&](const SourceVisitor& visitor) { inbox_.visit_any(visitor); }));
   EXPECT_EQ(ready(set_), Users{1});
   for (int i = 0; i < 3; ++i) put({1, 0});  // one is overwritten
@@ -273,9 +274,28 @@ TEST_F(WaitSetOfANodeTest, AQueueIsReadyWhileItHasMessages) {
   EXPECT_EQ(ready(any_), Users{1});
 }
 
+TEST_F(WaitSetOfANodeTest, AQueueThatIsSilentIsTold) {
+  MessageQueue& subscribed = inbox_.add_queue({}, Timeout{1});
+  EXPECT_FALSE(inbox_.tick()) << "of no set";
+  EXPECT_TRUE(join(
+      set_, [&](const SourceVisitor& visitor) { EXPECT_FALSE(inbox_.visit(queue_, visitor)); }));
+  const Set other = std::make_shared<WaitSet>();
+  EXPECT_TRUE(join(other, [&](const SourceVisitor& visitor) {
+    static_cast<void>(inbox_.visit(subscribed, visitor));
+  }));
+  while (ready(other).empty()) EXPECT_TRUE(inbox_.tick());
+  EXPECT_TRUE(inbox_.receive(subscribed, kNoWait).is(Status::silence));
+  EXPECT_EQ(ready(other), Users{});
+  EXPECT_EQ(ready(set_), Users{});
+  inbox_.end(Ending::closed());
+  EXPECT_FALSE(inbox_.tick());
+}
+
 TEST_F(WaitSetOfANodeTest, AQueueThatGoesTakesItsMessagesAlong) {
   MessageQueue& subscribed = inbox_.add_queue({});
-  EXPECT_TRUE(join(set_, [&](const SourceVisitor& visitor) { inbox_.visit(subscribed, visitor); }));
+  EXPECT_TRUE(join(set_, [&](const SourceVisitor& visitor) {
+    static_cast<void>(inbox_.visit(subscribed, visitor));
+  }));
   EXPECT_TRUE(join(any_, [&](const SourceVisitor& visitor) { inbox_.visit_any(visitor); }));
   Message message = test::make_message("x", 1);
   EXPECT_TRUE(inbox_.put(subscribed, message, nullptr));
