@@ -116,10 +116,6 @@ class Node : public HubAccess {
                                     milliseconds_of(timeout), made);
     });
   }
-  Outcome<Sender> sender_to_service(std::string_view service, const SendOptions& options = {},
-                                    Timeout timeout = Timeout{5000}) const {
-    return sender(service, options, timeout);
-  }
   /// Sends one message; sender() and Sender::send() in one.
   Outcome<void> send(Peer to, BytesView data, const SendOptions& options = {},
                      Timeout timeout = kForever) const {
