@@ -54,6 +54,7 @@ SCENARIOS = {
     "library_round_trip": Scenario(relay_mode=None, metric="p50_us", roles=("echo", "pinger"), seconds_factor=2),
     "library_round_trip_one_cpu": Scenario(relay_mode=None, metric="p50_us", one_cpu=True, roles=("echo", "pinger"),
                                            seconds_factor=2),
+    "library_request": Scenario(relay_mode=None, metric="p50_us", roles=("answerer", "asker"), seconds_factor=2),
 }
 
 
@@ -285,6 +286,8 @@ GOALS = (
     Goal("library_round_trip_one_cpu", 16, "tcp", "rate_over_best", None, 1.1, at_least=True),
     Goal("library_round_trip_one_cpu", 16, "unix", "rate_over_best", None, 1.8, at_least=True),
     Goal("library_round_trip_one_cpu", 16, "unix", "rate_over_best" + UNIX, None, 1.8, at_least=True),
+    Goal("library_request", 16, "tcp", "request_over_plain", None, 1.2),
+    Goal("library_request", 16, "unix", "request_over_plain", None, 1.2),
 )
 
 
@@ -300,6 +303,7 @@ FIELD_TITLES = {
     "cpu_share": "of a processor used",
     "context_switches_per_second": "context switches/s",
     "seconds_over_null": "seconds longer than the null relay",
+    "request_over_plain": "times a plain round trip of the same run",
     "rate_over_best": "messages/s, times the best other library on TCP",
     "system_over_best": "system CPU a message, times the best other library on TCP",
     "rate_over_best" + UNIX: "messages/s, times the best other library on a Unix socket",

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <cstddef>
@@ -37,6 +38,16 @@ class LibraryClient {
   /// Sends to the partner. Thread safety: the main thread, and inside `on_message`.
   virtual void send(std::span<const std::byte> payload) = 0;
 
+  /// In place of open(): sends requests and plain messages of the partner back to it, each on a
+  /// thread of the library or one of its own. When it returns both reach it.
+  virtual void answer(const Setup& setup) = 0;
+  /// In place of open(): connects to a partner that answers.
+  virtual void begin_asking(const Setup& setup) = 0;
+  /// A request to the partner, and a plain message to it that it sends back. Both wait, and compare
+  /// what comes with what went.
+  virtual void ask(std::span<const std::byte> payload) = 0;
+  virtual void send_round(std::span<const std::byte> payload) = 0;
+
   /// Lets messages come until wake() was called since the last wait(), or the time is up (false).
   /// The main thread.
   virtual bool wait(Clock::time_point deadline) {
@@ -50,6 +61,12 @@ class LibraryClient {
     const std::lock_guard lock(mutex_);
     woken_ = true;
     changed_.notify_one();
+  }
+
+ protected:
+  static bool is_same(std::span<const std::byte> sent, const void* data, std::size_t size) {
+    const std::span got(static_cast<const std::byte*>(data), size);
+    return std::ranges::equal(sent, got);
   }
 
  private:

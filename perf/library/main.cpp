@@ -294,6 +294,62 @@ Findings make_round_trips(LibraryClient& client, LibraryClient::Setup setup,
   return findings;
 }
 
+/// So many requests, and then so many plain round trips: in turns, so that both have the same
+/// conditions.
+constexpr std::uint64_t kTurn = 64;
+
+/// Asks, and sends plain messages around, one after the other.
+Findings make_requests(LibraryClient& client, const LibraryClient::Setup& setup,
+                       const PairOptions& options) {
+  const auto pattern = pattern_payload(options.payload_bytes);
+  std::vector<std::byte> payload(pattern.begin(), pattern.end());
+  std::vector<std::int64_t> requests_ns;
+  std::vector<std::int64_t> plain_ns;
+  std::uint64_t number = 0;
+  const auto one_turn = [&](std::vector<std::int64_t>& times_ns, auto go) {
+    for (std::uint64_t count = 0; count < kTurn; ++count) {
+      store_le(payload.data(), make_stamp(kThere, number++));
+      const auto begin = Clock::now();
+      go();
+      times_ns.push_back((Clock::now() - begin).count());
+    }
+  };
+  const auto run = [&](std::chrono::nanoseconds duration) {
+    requests_ns.clear();
+    plain_ns.clear();
+    for (const auto end = Clock::now() + duration; Clock::now() < end;) {
+      one_turn(requests_ns, [&] { client.ask(payload); });
+      one_turn(plain_ns, [&] { client.send_round(payload); });
+    }
+  };
+  client.begin_asking(setup);
+  run(options.duration / 5);  // to warm up
+  const auto begin = Clock::now();
+  const ThreeProcesses processes(::getpid(), options.partner, options.hub);
+  run(options.duration);
+  const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
+  const auto messages = 2 * static_cast<double>(requests_ns.size() + plain_ns.size());
+  Findings findings;
+  add_percentiles(findings, requests_ns);
+  std::ranges::sort(plain_ns);
+  std::ranges::sort(requests_ns);
+  const auto middle = [](const std::vector<std::int64_t>& times_ns) {
+    return static_cast<double>(times_ns[times_ns.size() / 2]);
+  };
+  findings.add("plain_p50_us", middle(plain_ns) / 1000);
+  findings.add("request_over_plain", middle(requests_ns) / middle(plain_ns));
+  findings.add("messages_per_second", messages / seconds);
+  findings.add("messages", messages);
+  processes.add_to(findings, messages);
+  return findings;
+}
+
+[[noreturn]] void answer_requests(LibraryClient& client, const LibraryClient::Setup& setup) {
+  client.answer(setup);
+  say_ready();
+  for (;;) static_cast<void>(client.wait(Clock::now() + kAskAgain));
+}
+
 [[noreturn]] void echo(LibraryClient& client, const LibraryClient::Setup& setup) {
   client.open(setup, [&client](std::span<const std::byte> message) { client.send(message); });
   serve(client);
@@ -312,7 +368,7 @@ int main(int argc, char** argv) {
   double patience = 2;
   app.add_option("--role", role)
       ->required()
-      ->check(CLI::IsMember({"sender", "receiver", "pinger", "echo"}));
+      ->check(CLI::IsMember({"sender", "receiver", "pinger", "echo", "asker", "answerer"}));
   app.add_option("--connect", setup.url, "tcp://HOST:PORT or unix:PATH")->required();
   app.add_option("--hub", options.hub, "process id of the hub, for who measures");
   app.add_option("--partner", options.partner, "process id of the partner, for who measures");
@@ -325,14 +381,16 @@ int main(int argc, char** argv) {
 
   options.duration = std::chrono::nanoseconds(static_cast<std::int64_t>(seconds * 1e9));
   options.patience = std::chrono::nanoseconds(static_cast<std::int64_t>(patience * 1e9));
-  setup.is_first = role == "receiver" || role == "echo";
+  setup.is_first = role == "receiver" || role == "echo" || role == "answerer";
   setup.own = setup.is_first ? "second" : "first";
   setup.partner = setup.is_first ? "first" : "second";
   const auto client = make_library_client();
   if (role == "receiver") receive_bursts(*client, setup, options);
   if (role == "echo") echo(*client, setup);
-  Findings findings = role == "sender" ? send_bursts(*client, setup, options)
-                                       : make_round_trips(*client, setup, options);
+  if (role == "answerer") answer_requests(*client, setup);
+  Findings findings = role == "sender"  ? send_bursts(*client, setup, options)
+                      : role == "asker" ? make_requests(*client, setup, options)
+                                        : make_round_trips(*client, setup, options);
   findings.add("rss_peak_bytes", static_cast<double>(peak_resident_bytes(options.hub)));
   std::puts(findings.json().c_str());
 }

@@ -1,9 +1,13 @@
-// NIF, with its callback: messages are seen to on the library's thread.
+// NIF, with its callback: messages are seen to on the library's thread. Requests, and what they are
+// compared with, are those of GIMI, whose messages wait in queues.
 
 #include <atomic>
+#include <optional>
 #include <string>
+#include <thread>
 #include <utility>
 
+#include "gimnet/gimi.hpp"
 #include "gimnet/nif.h"
 #include "library/library_client.hpp"
 #include "net/socket.hpp"
@@ -50,7 +54,57 @@ class NifClient final : public LibraryClient {
           "send");
   }
 
+  void answer(const Setup& setup) override {
+    const Node& node = join(setup);
+    const Answers answers = node.answer("echo").or_throw();
+    std::thread([answers] {
+      for (;;) {
+        auto request = answers.receive().or_throw();
+        request.reply(request.text()).or_throw();
+      }
+    }).detach();
+    const Queue queue = node.queue(kPlain);
+    std::thread([&node, queue] {
+      for (;;) {
+        const Message message = queue.receive().or_throw();
+        node.sender(message.from(), {.key = kPlain}).or_throw().send(message.text()).or_throw();
+      }
+    }).detach();
+  }
+
+  void begin_asking(const Setup& setup) override {
+    const Node& node = join(setup);
+    service_ = setup.partner + "/echo";
+    queue_.emplace(node.queue(kPlain));
+    const Peer partner = node.find(setup.partner).or_throw();
+    sender_.emplace(node.sender(partner, {.key = kPlain}).or_throw());
+  }
+
+  void ask(std::span<const std::byte> payload) override {
+    const Reply reply = gimi_->request(service_, payload, kPatience);
+    if (!reply) fail("ask: " + reply.failure().sentence);
+    if (!is_same(payload, reply.data().data(), reply.data().size())) fail("another reply came");
+  }
+
+  void send_round(std::span<const std::byte> payload) override {
+    sender_->send(payload).or_throw();
+    const Message message = queue_->receive(kPatience).or_throw();
+    if (!is_same(payload, message.data().data(), message.size())) fail("another message came");
+  }
+
  private:
+  static constexpr MessageKey kPlain{1, 0};
+  static constexpr Timeout kPatience{kPatienceMs};
+
+  const Node& join(const Setup& setup) {
+    NodeOptions options;
+    options.hub = setup.url;
+    options.name = setup.own;
+    options.keep_token = false;
+    options.resume = false;  // as above
+    return gimi_.emplace(Node::join(options).or_throw());
+  }
+
   void take(const nif_incoming& in) {
     if (in.type != NIF_MESSAGE) return;
     if (partner_.load(std::memory_order_relaxed) != in.from) partner_.store(in.from);
@@ -60,6 +114,11 @@ class NifClient final : public LibraryClient {
   std::atomic<nif_node*> node_{nullptr};  ///< read by the library's thread, too
   OnMessage on_message_;
   std::atomic<std::uint32_t> partner_{0};  ///< no partner: a number by itself
+
+  std::optional<Node> gimi_;
+  std::string service_;
+  std::optional<Queue> queue_;
+  std::optional<Sender> sender_;
 };
 
 }  // namespace
