@@ -68,7 +68,7 @@ TEST_F(ExecutorTest, AWaitSetTellsOfEachKindOfMember) {
   EXPECT_EQ(set_.wait(kWait).or_throw(), Users{5});
   set_.remove(watch).or_throw();
   set_.add(viewer_, 6).or_throw();
-  robot_.send("viewer", "hello").or_throw();
+  robot_.send(robot_.find("viewer").or_throw(), "hello").or_throw();
   EXPECT_EQ(set_.wait(kWait).or_throw(), Users{6});
   EXPECT_EQ(viewer_.receive(kNoWait)->text(), "hello");
   EXPECT_TRUE(set_.wait(kNoWait).is(Status::timeout));

@@ -116,7 +116,7 @@ TEST_F(WatchTableTest, OneThatIsNotReadHoldsUpNothingElse) {
   for (int i = 0; i < 100; ++i) {
     Node robot = join("robot-" + std::to_string(i));
     EXPECT_EQ(next(busy), "joined robot-" + std::to_string(i));
-    sender.send("viewer", "x").or_throw();
+    sender.send(sender.find("viewer").or_throw(), "x").or_throw();
     EXPECT_TRUE(viewer.receive(kWait));
     robot.close();
     EXPECT_EQ(next(busy), "left robot-" + std::to_string(i));

@@ -35,7 +35,7 @@ TEST(Outgoing, ChecksEveryField) {
   EXPECT_EQ(bad([](auto& m) { m.kind = 5; }), NIF_BAD_ARGUMENT);
   EXPECT_EQ(bad([](auto& m) { m.lane = 4; }), NIF_BAD_ARGUMENT);
   EXPECT_EQ(bad([](auto& m) { m.policy = 4; }), NIF_BAD_ARGUMENT);
-  EXPECT_EQ(bad([](auto& m) { m.flags = 8; }), NIF_BAD_ARGUMENT);
+  EXPECT_EQ(bad([](auto& m) { m.flags = 16; }), NIF_BAD_ARGUMENT);
   EXPECT_EQ(bad([](auto& m) { m.trace_slots = 9; }), NIF_BAD_ARGUMENT);
   EXPECT_EQ(bad([](auto& m) { m.policy = NIF_LATEST; }), NIF_BAD_ARGUMENT) << "no key";
   EXPECT_EQ(bad([](auto& m) { m.part_count = 1; }), NIF_BAD_ARGUMENT) << "parts is NULL";

@@ -15,8 +15,8 @@ using proto::Kind;
 using proto::Lane;
 
 /// A request that another hub does not answer is answered by the own hub after 5 s, on a clock that
-/// may have stood still.
-constexpr milliseconds kAnswerMost{9'000};
+/// may have stood still. Two frames ahead of it may have waited for room, 5 s each.
+constexpr milliseconds kAnswerMost{19'000};
 /// A node is heard of though the hub has no reason to ask.
 constexpr milliseconds kSpeaksEvery{1'000};
 constexpr milliseconds kPauseOfAnotherHub{1'000};
