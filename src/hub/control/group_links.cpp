@@ -13,13 +13,18 @@ using std::chrono::milliseconds;
 
 NodePlace node_place(const Place& place) { return {place.shard, place.slot, place.generation}; }
 
+/// As JOIN can say it, which is more than any limit allows.
+std::uint16_t clamped(std::uint32_t messages) {
+  return static_cast<std::uint16_t>(std::min<std::uint32_t>(messages, UINT16_MAX));
+}
+
 /// The widest terms of all subscribers here. Those without terms want everything.
 JoinTerms wish_of(const Topic& topic) {
   JoinTerms wish;
   if (topic.terms.size() < topic.subscribers.size()) return wish;
   bool first = true;
   for (const auto& [subscriber, asked] : topic.terms) {
-    const JoinTerms terms{asked.interval_us, asked.depth};
+    const JoinTerms terms{asked.interval_us, clamped(asked.depth), clamped(asked.window)};
     wish = std::exchange(first, false) ? terms : widest(wish, terms);
   }
   return wish;
@@ -42,8 +47,8 @@ class GroupLinks::Change {
     const bool other_terms = is_new || member.terms != branch.terms;
     member.terms = branch.terms;
     // One that was paced stays so: what is held for it goes before what comes.
-    member.paced =
-        was_paced || stream_.retain || stream_.window != 0 || branch.terms.interval_us != 0;
+    const bool bounded = stream_.window != 0 || branch.terms.window != 0;
+    member.paced = was_paced || stream_.retain || bounded || branch.terms.interval_us != 0;
     if (member.paced && !was_paced) member.once_plain = !is_new;
     links_.push_back({node_place(member.place), member.paced, member.once_plain});
     if (!member.paced) return;
@@ -65,7 +70,10 @@ class GroupLinks::Change {
     command.session = ref_of(member.place);
     command.group = group_;
     const auto depth_most = static_cast<std::uint32_t>(parts_.limits.subscription_depth);
-    command.terms = {stream_.window, std::min(member.terms.depth, depth_most),
+    const std::uint32_t asked = member.terms.window;
+    const bool all = asked == 0 || (stream_.window != 0 && stream_.window < asked);
+    command.terms = {all ? stream_.window : asked,
+                     std::min<std::uint32_t>(member.terms.depth, depth_most),
                      member.terms.interval_us};
     command.retained = stream_.retain;
     command.was_plain = member.once_plain;

@@ -9,9 +9,10 @@ namespace join_key {
 enum : std::uint32_t { groups = 1, anew };
 }  // namespace join_key
 
-// An entry of JOIN on the wire: {u32 group id, u32 interval, u32 depth}.
+// An entry of JOIN on the wire: {u32 group id, u32 interval, u16 depth, u16 window}.
 constexpr std::size_t kIntervalOffset = 4;
 constexpr std::size_t kDepthOffset = 8;
+constexpr std::size_t kWindowOffset = 10;
 constexpr std::size_t kEntrySize = 12;
 
 /// The list under key 1, of entries of one size.
@@ -61,6 +62,7 @@ void Join::write(bitestream::Writer& writer) const {
     store_le(next, each.group.value());
     store_le(next + kIntervalOffset, each.terms.interval_us);
     store_le(next + kDepthOffset, each.terms.depth);
+    store_le(next + kWindowOffset, each.terms.window);
     next += kEntrySize;
   }
   writer.put_opaque(join_key::groups, list);
@@ -74,7 +76,8 @@ Join Join::read(Fields& fields) {
     const std::byte* entry = bytes.data() + at;
     join.groups.push_back({read_group(fields, entry),
                            {load_le<std::uint32_t>(entry + kIntervalOffset),
-                            load_le<std::uint32_t>(entry + kDepthOffset)}});
+                            load_le<std::uint16_t>(entry + kDepthOffset),
+                            load_le<std::uint16_t>(entry + kWindowOffset)}});
     if (join.groups.back().terms.depth == 0) fields.fail("has a depth of 0");
   }
   join.anew = fields.flag(join_key::anew, "wish for last messages", false);

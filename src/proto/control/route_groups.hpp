@@ -18,7 +18,8 @@ inline constexpr std::size_t kGroupsMax = 512;
 /// The terms of a hub for a group, on behalf of all subscribers behind it.
 struct JoinTerms {
   std::uint32_t interval_us = 0;  ///< between two messages at least; 0: none
-  std::uint32_t depth = 1;        ///< newest messages that are held for it
+  std::uint16_t depth = 1;        ///< newest messages that are held for it
+  std::uint16_t window = 0;       ///< messages that may wait for the link; 0: any number
   friend bool operator==(const JoinTerms&, const JoinTerms&) = default;
 };
 

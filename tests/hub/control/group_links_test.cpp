@@ -94,11 +94,13 @@ TEST_F(GroupLinksTest, AJoinWaitsForAGroupThatDoesNotExist) {
 
 TEST_F(GroupLinksTest, ALinkIsPacedAsItsTermsSay) {
   advertise();
-  static_cast<void>(join(kDown, kOwnGroup, {1'000'000, 1'000'000}));
+  static_cast<void>(join(kDown, kOwnGroup, {1'000'000, 60'000}));
   EXPECT_EQ(members(kOwnGroup)->by_shard[0].size(), 0u);
   EXPECT_EQ(members(kOwnGroup)->paced_by_shard.at(0).size(), 1u);
   const PaceCommand* pace = rig_.shards.all<PaceCommand>().back();
   EXPECT_EQ(pace->terms, (PaceTerms{0, 64, 1'000'000})) << "no more than one node may hold";
+  static_cast<void>(take(kDown, route::Join{{{kOwnGroup, {0, 1, 2}}}, false}));
+  EXPECT_EQ(rig_.shards.all<PaceCommand>().back()->terms, (PaceTerms{2, 1, 0}));
   static_cast<void>(take(kDown, route::Join{{{kOwnGroup, {}}}, false}));
   EXPECT_EQ(rig_.shards.all<PaceCommand>().back()->terms, (PaceTerms{0, 1, 0}));
   EXPECT_EQ(members(kOwnGroup)->paced_by_shard.at(0).size(), 1u)

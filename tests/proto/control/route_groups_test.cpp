@@ -11,7 +11,7 @@ constexpr GroupId kScan = make_id<GroupId>(HubId{2}, 33);
 constexpr GroupId kMap = make_id<GroupId>(HubId{2}, 34);
 
 TEST(RouteGroups, AreDecodedAndWrittenAsTheVectorsSay) {
-  test::expect_request("route/join", 0, Join{{{kScan, {100'000, 1}}, {kMap, {0, 4}}}, true});
+  test::expect_request("route/join", 0, Join{{{kScan, {100'000, 1}}, {kMap, {0, 4, 2}}}, true});
   test::expect_request("route/leave", 0, Leave{{kScan}});
   test::expect_request("route/joins_end", 0, JoinsEnd{});
   test::expect_request("route/joined", 0, Joined{{kMap}});

@@ -10,7 +10,9 @@ namespace gimnet::hub {
 namespace route = proto::route;
 
 JoinTerms widest(const JoinTerms& a, const JoinTerms& b) {
-  return {std::min(a.interval_us, b.interval_us), std::max(a.depth, b.depth)};
+  const bool unbound = a.window == 0 || b.window == 0;
+  return {std::min(a.interval_us, b.interval_us), std::max(a.depth, b.depth),
+          unbound ? std::uint16_t{0} : std::max(a.window, b.window)};
 }
 
 /// Messages for each link, with several groups in each.

@@ -42,6 +42,11 @@ std::string text_of(const proto::Payload& bytes) {
   return proto::decode<route::JoinsEnd>(bytes) ? "end" : "?";
 }
 
+TEST(JoinTerms, AreAsWideAsTheWidest) {
+  EXPECT_EQ(widest({100, 1, 2}, {200, 3, 1}), (JoinTerms{100, 3, 2}));
+  EXPECT_EQ(widest({100, 1, 2}, {200, 3, 0}), (JoinTerms{100, 3, 0})) << "one wants everything";
+}
+
 class GroupTreesTest : public ::testing::Test {
  protected:
   GroupTreesTest() { way(kUp); }
