@@ -14,7 +14,7 @@ Times are in seconds. Everything may be used by any thread. After a fork the chi
 from .bitestream import BitestreamError, Time
 from .errors import (BadArgument, BadName, BadVersion, Busy, Closed, Denied, Expired, Failed, Forked, GimnetError, Gone, Limit, NameTaken,
                      NoHost, NoHub, NoRight, NotConnected, NotDelivered, NotFound, NotRetained, NotTrusted, Protocol,
-                     Refused, System, Taken, Timeout, TooLarge, WindowFull)
+                     Refused, Silence, System, Taken, Timeout, TooLarge, WindowFull)
 from .messages import Event, Message, NodeRecord, Peer, ServiceRecord
 from .node import Node, Publisher, Source, State, Watch, connect
 from .requests import Answers, Pending, Reply, Request
@@ -24,6 +24,6 @@ __all__ = [
     "Answers", "BadArgument", "BadName", "BadVersion", "BitestreamError", "Busy", "Closed", "Denied", "Event", "Expired",
     "Failed", "Forked", "GimnetError", "Gone", "Limit", "Message", "NameTaken", "NoHost", "NoHub", "NoRight", "Node", "NodeRecord", "NotConnected",
     "NotDelivered", "NotFound", "NotRetained", "NotTrusted", "Peer", "Pending", "Protocol", "Publisher", "Refused", "Reply",
-    "Request", "ServiceRecord",
+    "Request", "ServiceRecord", "Silence",
     "Source", "State", "System", "Taken", "Time", "Timeout", "TooLarge", "WaitSet", "Watch", "WindowFull", "connect",
 ]

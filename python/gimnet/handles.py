@@ -180,6 +180,7 @@ class Waitable(Blocking):
         super().__init__(handle, kept)
         self._set: Optional[RawSet] = None  # of this handle alone, once a thread waits
         self.shared = False  # the program waits by a descriptor or a WaitSet: nothing is fetched ahead
+        self.poll_ms = TIMEOUT_MS_MAX  # the library is asked so often, also if nothing comes
 
     @property
     def number(self) -> int:
@@ -233,12 +234,12 @@ class Waitable(Blocking):
             return status
         end = end_of(timeout)
         while status == _c.GIMI_TIMEOUT:
-            left = left_ms(end, TIMEOUT_MS_MAX)
+            left = left_ms(end, self.poll_ms)
             if left <= 0:
                 break
             own = self.own_set()
             if own is None:
-                return in_pieces(None if end == math.inf else left / 1000, call)
+                return in_pieces(None if end == math.inf else max(0.0, end - time.monotonic()), call)
             own.poll(left)
             status = int(call(0))
         return status

@@ -181,7 +181,10 @@ class Node(Waitable):
         options = sized(_c.gimi_subscribe_options, rate_hz=rate_hz, queue=queue, timeout_ms=to_ms(timeout),
                          newest_only=newest_only, silence_ms=to_ms(silence) if silence else 0, window=window,
                          depth=depth)
-        return Source(self, self._opened(_c.lib.gimi_subscribe, to_text(full_name), options))
+        made = Source(self, self._opened(_c.lib.gimi_subscribe, to_text(full_name), options))
+        if silence:
+            made.poll_ms = max(1, to_ms(silence) // 4)
+        return made
 
     def accept(self, name: str, *, queue: int = 0, key: Tuple[int, int] = (0, 0), metadata: str = "",
                timeout: float = 5.0) -> Source:

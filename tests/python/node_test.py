@@ -71,6 +71,24 @@ class Nodes(unittest.TestCase):
         self.assertEqual([(view[0], view[-1], view.readonly) for view in kept],
                          [(number, number, True) for number in range(0, 20, 3)])
 
+    def test_silence_is_told_from_the_end(self):
+        publisher = self.robot.advertise("pulse", age_max=10.0)
+        subscription = self.viewer.subscribe("robot/pulse", silence=0.05)
+        publisher.wait_for_subscribers(1, PATIENCE_S)
+        with self.assertRaises(gimnet.Silence):
+            subscription.receive()
+        publisher.publish("beat")
+        self.assertEqual(subscription.receive(PATIENCE_S).text, "beat")
+        with self.assertRaises(gimnet.Silence):
+            subscription.receive()
+        self.viewer.close()
+        with self.assertRaises(gimnet.Closed):
+            subscription.receive()
+
+    def test_joins_under_the_next_number(self):
+        with gimnet.connect("robot", hub=self.hub.url, number_if_taken=True) as second:
+            self.assertEqual(second.name, "robot-2")
+
     def test_sends_commands_to_a_service_and_to_a_peer(self):
         drive = self.robot.accept("drive")
         self.viewer.send("robot/drive", {"v": 0.5})
