@@ -18,7 +18,7 @@ namespace {
       "  --seed SEED       that one world only\n"
       "  --expect CHECKER  succeed only if that checker finds something: for planted bugs\n"
       "  --checkers        the names of the checkers\n",
-      simulation.seeds_for_all);
+      simulation.seeds);
   std::exit(2);
 }
 
@@ -36,7 +36,7 @@ bool print_census(const Simulation& simulation, const std::vector<std::uint64_t>
 
 Arguments read_arguments(const Simulation& simulation, int count, char** texts) {
   Arguments arguments;
-  arguments.seeds = simulation.seeds_for_all;
+  arguments.seeds = simulation.seeds;
   for (int at = 1; at < count; ++at) {
     const std::string_view flag = texts[at];
     if (flag == "--checkers") {

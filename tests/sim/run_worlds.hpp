@@ -29,6 +29,7 @@ struct Simulation {
   std::span<const std::string_view> events;
   /// In so many worlds each fault and collision comes.
   std::uint64_t seeds_for_all;
+  std::uint64_t seeds;                  ///< of a plain run
   std::vector<std::string_view> flags;  ///< without a value
 };
 

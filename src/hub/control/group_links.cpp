@@ -178,11 +178,14 @@ void GroupLinks::set_keeper(GroupId group, const std::optional<TablePublisher::A
   std::optional<Keeper> now;
   if (away && away->retain && away->link.exists()) now = {away->link.shard, away->provider};
   const auto before = keepers_.find(group);
+  const bool begins = before == keepers_.end();
   if (before != keepers_.end() && now != before->second) {
     parts_.shards.send(before->second.shard, ForgetRetainedCommand{group, before->second.provider});
     keepers_.erase(before);
   }
-  if (now) keepers_[group] = *now;
+  if (!now) return;
+  if (begins) trees_.want_anew(group);
+  keepers_[group] = *now;
 }
 
 GroupLinks::Stream GroupLinks::stream_of(GroupId group) const {

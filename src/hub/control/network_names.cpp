@@ -71,6 +71,7 @@ void NetworkNames::note(const ServiceNoted& noted) {
   if (!exchange_) return;
   if (noted.kind == ChangeKind::withdrawn) {
     exchange_->remove_own(noted.full_name);
+    withdrawn_.push_back(noted.full_name);
   } else if (const Topic* topic = parts_.membership.services().find_group(noted.group)) {
     put(*topic);
   }
@@ -103,6 +104,10 @@ void NetworkNames::settle(milliseconds now, Effects& effects) {
   if (!exchange_) return;
   // The look-ups are valid until a name changes: the effects say so only later.
   for (const KnownName& winner : exchange_->take_lost()) let_go(winner, now, effects);
+  for (const std::string& name : std::exchange(withdrawn_, {})) {
+    if (const auto away = away_service(name))
+      parts_.membership.services().note_moved(name, away, now, effects);
+  }
   for (const NameChange& change : exchange_->take_changes()) {
     const bool service =
         (change.before && change.before->service) || (change.after && change.after->service);

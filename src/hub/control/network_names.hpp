@@ -74,6 +74,8 @@ class NetworkNames {
 
   const Parts parts_;
   std::optional<NameExchange> exchange_;
+  /// Own services that ended: another hub may have one of that name. Limit: those of one settle().
+  std::vector<std::string> withdrawn_;
   std::uint64_t dropped_copies_ = 0;  ///< that those who watch were told of
 };
 

@@ -8,8 +8,7 @@
 
 namespace gimnet::sim::hubs {
 
-/// The checkers. Each checker has a planted bug that it must find. Those of groups across hubs
-/// stand between `one_owner` and `resumes` once there are such groups.
+/// The checkers. Each checker has a planted bug that it must find.
 enum class Checker : std::uint8_t {
   never_back,    ///< no frame goes back to the hub that it came from
   hops,          ///< each frame says how many links it crossed, and crosses at most 31
@@ -23,12 +22,15 @@ enum class Checker : std::uint8_t {
   reachable,     ///< frames between all pairs arrive
   moves,         ///< a node that goes to another hub has its name there at once
   one_owner,     ///< of connected hubs one has a name, and all say so
+  parents,       ///< a group of another hub comes from the next hop towards that hub
+  subscribers,   ///< a new subscriber at any hub gets the last message, and those that follow
   resumes,       ///< nobody stays paused or held
   ledgers,       ///< each hub's ledger is exact, and those of both ends of a link agree
 };
-inline constexpr std::array<std::string_view, 14> kCheckerNames = {
-    "never_back",   "hops",    "one_link",  "right_node", "bounded",   "answered", "joined",
-    "equal_tables", "no_loop", "reachable", "moves",      "one_owner", "resumes",  "ledgers"};
+inline constexpr std::array<std::string_view, 16> kCheckerNames = {
+    "never_back", "hops",         "one_link", "right_node", "bounded", "answered",
+    "joined",     "equal_tables", "no_loop",  "reachable",  "moves",   "one_owner",
+    "parents",    "subscribers",  "resumes",  "ledgers"};
 
 /// Thrown by a checker: the world is broken and stops.
 struct Broken {

@@ -7,7 +7,8 @@
 int main(int count, char** texts) {
   using namespace gimnet::sim;
   const Simulation simulation{
-      "gimnet-sim-hubs", hubs::kCheckerNames, hubs::kEventNames, 400, {"--large", "--trace"}};
+      "gimnet-sim-hubs",     hubs::kCheckerNames, hubs::kEventNames, 400, 2'000,
+      {"--large", "--trace"}};
   const Arguments arguments = read_arguments(simulation, count, texts);
   gimnet::set_log_level(gimnet::LogLevel::off);
   hubs::Census census;

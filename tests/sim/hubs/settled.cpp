@@ -34,6 +34,7 @@ void Settled::check() {
   check_tables();
   for (std::size_t hub = 0; hub < world_.machines_.size(); ++hub) check_ways(hub);
   check_moves();
+  check_groups();
   ask_names();
   send_to_all();
   check_names();

@@ -21,6 +21,10 @@ constexpr milliseconds kAnswerMost{19'000};
 constexpr milliseconds kSpeaksEvery{1'000};
 constexpr milliseconds kPauseOfAnotherHub{1'000};
 constexpr std::size_t kAskedMost = 16;
+constexpr std::size_t kWantedMost = 4;
+/// Nodes that some others want the service of have one of so many first names.
+constexpr std::uint64_t kGiversMost = 12;
+constexpr const char* kGiven = "gives";
 constexpr std::uint64_t kSmallBytes = 100;
 constexpr std::uint64_t kLargeBytes = 20'000;
 
@@ -53,6 +57,7 @@ void SimNode::join(SimHub& hub, milliseconds now) {
   opened_ = welcomed_ = false;
   paused_.clear();
   asked_.clear();
+  given_.reset();
   hub::Stranger stranger;
   stranger.transport = std::move(stream);
   stranger.peer = {"unix", plan_.name};
@@ -143,6 +148,10 @@ void SimNode::take(const proto::FrameHeader& header, std::span<const std::byte> 
       if (header.dst != own) broken(Checker::right_node, "a node gets a frame for another id");
       return around_.book.note_arrived(payload, session_);
     }
+    case Kind::group:
+      if (administers_ && payload.size() >= Book::kNumberBytes)
+        heard_[GroupId{header.dst}].push_back(load_le<std::uint64_t>(payload.data()));
+      return;
     case Kind::flow:
       return take_flow(payload);
     case Kind::report:
@@ -153,7 +162,11 @@ void SimNode::take(const proto::FrameHeader& header, std::span<const std::byte> 
         if (std::exchange(waits_, false)) begin_session(welcome->node, true);
         name_ = welcome->name;
         token_ = welcome->token;
-        if (!administers_ && around_.random.chance(400)) offer();
+        if (administers_) return;
+        if (around_.random.chance(400)) offer();
+        gives_ = gives_ || around_.random.chance(150);
+        if (gives_) give();
+        for (const std::string& each : std::set<std::string>(wanted_)) subscribe(each);
       } else if (const auto goodbye = proto::decode<proto::Goodbye>(payload)) {
         goodbye_ = ": " + goodbye->sentence;
       }
@@ -197,8 +210,10 @@ void SimNode::take_control(std::span<const std::byte> payload) {
   if (found == asked_.end())
     broken(Checker::answered, "node " + plan_.name + " gets an answer that it did not ask for");
   const std::string name = found->second.name;
+  const bool gives = found->second.gives;
   asked_.erase(found);
   if (const auto offered = proto::decode_answer<ns::AdvertiseAnswer>(payload)) {
+    if (gives) return void(given_ = offered->group);
     group_ = offered->group;
     return around_.book.note_group(offered->group, session_);
   }
@@ -214,7 +229,12 @@ void SimNode::say() {
   const std::uint64_t bytes_most = random.chance(30) ? kLargeBytes : kSmallBytes;
   const proto::Policy policy = random.chance(800) ? proto::Policy::block : proto::Policy::drop;
   if (choice < 10) return ask_something();
-  if (choice < 25 && !around_.book.groups().empty()) {
+  if (choice < 14) {
+    if (wanted_.size() < kWantedMost) subscribe("n" + std::to_string(random.below(kGiversMost)));
+    return;
+  }
+  if (choice < 24 && given_) return void(publish());
+  if (choice < 34 && !around_.book.groups().empty()) {
     auto entry = around_.book.groups().begin();
     std::advance(entry, static_cast<std::ptrdiff_t>(random.below(around_.book.groups().size())));
     // Nobody knows who has it by then.
@@ -242,6 +262,30 @@ void SimNode::offer() {
   advertise.direction = ns::Direction::accepts;
   ++last_request_;
   ask(Kind::ns, proto::encode(advertise, last_request_), last_request_, {});
+}
+
+void SimNode::give() {
+  if (name_.empty()) return;
+  ns::Advertise advertise;
+  advertise.service = kGiven;
+  advertise.retain = true;
+  ++last_request_;
+  ask(Kind::ns, proto::encode(advertise, last_request_), last_request_, {});
+  asked_[last_request_].gives = true;
+}
+
+std::uint64_t SimNode::publish() {
+  std::vector<std::byte> payload(Book::kNumberBytes);
+  store_le(payload.data(), ++published_);
+  write(Kind::group, given_->value(), payload);
+  return published_;
+}
+
+void SimNode::subscribe(const std::string& node) {
+  wanted_.insert(node);
+  ++last_request_;
+  ask(Kind::ns, proto::encode(ns::Subscribe{node + "/" + kGiven}, last_request_), last_request_,
+      {});
 }
 
 void SimNode::resolve(const std::string& name, HubId hub) {

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <tuple>
@@ -43,10 +44,18 @@ class SimNode {
   [[nodiscard]] NodeId id() const { return id_; }
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] const std::string& last() const { return last_; }
+  /// Of the service with last message that it provides; nothing: it has none.
+  [[nodiscard]] std::optional<GroupId> given() const { return given_; }
   [[nodiscard]] bool is_paused() const { return !paused_.empty(); }
 
   /// A small frame. Returns its number; nothing: it was told to pause. REQUIRES: is_up().
   std::optional<std::uint64_t> send_to(NodeId to);
+  /// A message to the subscribers of its service. Returns its number. REQUIRES: given().
+  std::uint64_t publish();
+  /// To the service that a node of that name provides, if there is one.
+  void subscribe(const std::string& node);
+  /// Numbers of the messages of that group that came since it was asked for.
+  [[nodiscard]] std::vector<std::uint64_t>& heard(GroupId group) { return heard_[group]; }
   void ask(proto::Kind kind, const proto::Payload& payload, std::uint16_t request, HubId hub);
   void resolve(const std::string& name, HubId hub);
   template <class Message>
@@ -60,13 +69,15 @@ class SimNode {
  private:
   struct Asked {
     milliseconds at;
-    std::string name;  ///< that was to be resolved
+    std::string name;    ///< that was to be resolved
+    bool gives = false;  ///< ADVERTISE of a service with last message
   };
   void join(SimHub& hub, milliseconds now);
   void begin_session(NodeId id, bool new_session);
   void say();
   void ask_something();
   void offer();
+  void give();
   void read(milliseconds now);
   void take(const proto::FrameHeader& header, std::span<const std::byte> payload);
   void say_flow(const proto::flow::Message& message);
@@ -94,6 +105,11 @@ class SimNode {
   std::string name_;
   std::vector<std::byte> token_;
   std::optional<GroupId> group_;  ///< of its service, which takes data
+  bool gives_ = false;            ///< it has a service with last message, each time that it joins
+  std::optional<GroupId> given_;
+  std::uint64_t published_ = 0;
+  std::set<std::string> wanted_;  ///< full names of services
+  std::map<GroupId, std::vector<std::uint64_t>> heard_;
   milliseconds now_{0};
   milliseconds back_at_{0};
   milliseconds say_at_{0};

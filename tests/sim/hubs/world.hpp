@@ -121,7 +121,7 @@ class World {
   bool faults_ = true;                     ///< they may come, and nodes speak by themselves
 };
 
-/// Looks at a world that was left alone: settled.cpp, moves.cpp, arrivals.cpp.
+/// Looks at a world that was left alone: settled.cpp, moves.cpp, groups.cpp, arrivals.cpp.
 class Settled {
  public:
   explicit Settled(World& world);
@@ -142,6 +142,7 @@ class Settled {
   [[nodiscard]] std::optional<int> follow(std::size_t from, std::size_t to) const;
   void find_distances();
   void check_moves();
+  void check_groups();
   void ask_names();
   void check_names();
   void send_to_all();

@@ -6,7 +6,7 @@
 int main(int count, char** texts) {
   using namespace gimnet::sim;
   const Simulation simulation{
-      "gimnet-sim-routes", routes::kCheckerNames, routes::kEventNames, 500, {}};
+      "gimnet-sim-routes", routes::kCheckerNames, routes::kEventNames, 500, 500, {}};
   routes::Census census;
   const auto run_world = [&](std::uint64_t seed) {
     routes::World world(seed);

@@ -153,7 +153,11 @@ void Services::note_moved(std::string_view full_name, const std::optional<AwaySe
   const auto found = topics_.find(full_name);
   if (found == topics_.end() || found->second.provided()) return;
   Topic& topic = found->second;
-  if (topic.subscribers.empty()) return;
+  if (topic.subscribers.empty()) {
+    // Its next subscriber is to find the other hub's service.
+    if (away && topic.service) give_back(topic, now, effects);
+    return;
+  }
   const auto held = away ? away_.find(away->group) : away_.end();
   const bool usable = away && (held == away_.end() || held->second == &topic);
   const auto same_stream = [&] {

@@ -152,6 +152,13 @@ void GroupTrees::want(GroupId group, std::optional<JoinTerms> terms) {
   note(group);
 }
 
+void GroupTrees::want_anew(GroupId group) {
+  const auto tree = trees_.find(group);
+  if (tree == trees_.end() || tree->second.said_to == LinkNumber{}) return;
+  tree->second.anew = true;
+  unsaid_.insert(group);
+}
+
 void GroupTrees::set_next_hops(const std::array<LinkNumber, NetworkMap::kHubIds>& next_hops) {
   const auto before = std::exchange(next_hops_, next_hops);
   for (const auto& [group, tree] : trees_) {
@@ -209,7 +216,8 @@ void GroupTrees::say(GroupId group, Tree& tree, Batches& batches) {
     if (moved && tree.said_to != LinkNumber{}) batches.leave(tree.said_to, group);
     if (to != LinkNumber{}) {
       const JoinTerms terms = *wish(tree, to);
-      if (moved || terms != tree.said) batches.join(to, {group, terms}, moved);
+      const bool anew = std::exchange(tree.anew, false) || moved;
+      if (anew || terms != tree.said) batches.join(to, {group, terms}, anew);
       tree.said = terms;
     }
     if (moved) tree.answered = false;

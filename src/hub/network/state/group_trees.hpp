@@ -52,6 +52,9 @@ class GroupTrees {
   /// The wish of this hub's subscribers to a group; nothing: there are none. REQUIRES: a group
   /// of another hub.
   void want(GroupId group, std::optional<JoinTerms> terms);
+  /// The last message of the group, which passed by when nobody knew that it is to be kept, is
+  /// asked for again.
+  void want_anew(GroupId group);
   /// By hub id, as in NetworkMap.
   void set_next_hops(const std::array<LinkNumber, NetworkMap::kHubIds>& next_hops);
 
@@ -78,6 +81,7 @@ class GroupTrees {
     LinkNumber said_to;  ///< whom JOIN was said to; 0: nobody
     JoinTerms said;
     bool answered = false;  ///< by that neighbour
+    bool anew = false;      ///< it is to be asked for the last message again
   };
   using Trees = std::map<GroupId, Tree>;
   class Batches;

@@ -72,6 +72,21 @@ TEST_F(ServicesTest, AGroupThatNobodyUsesIsGivenBackAfterAGraceTime) {
   EXPECT_EQ(advertise(kRobot, "robot/odom"), GroupIndex{2}) << "the id rests";
 }
 
+TEST_F(ServicesTest, AGroupThatNobodyUsesMakesWayForTheServiceOfAnotherHub) {
+  const AwayService away{make_id<GroupId>(HubId{9}, 3), make_id<NodeId>(HubId{9}, 1)};
+  advertise(kRobot, "robot/odom");
+  services_.note_moved("robot/odom", away, now_, effects_);
+  EXPECT_NE(services_.find_group(GroupIndex{1}), nullptr) << "it is provided here";
+  EXPECT_FALSE(services_.withdraw(kRobot, GroupIndex{1}, now_, effects_));
+  services_.note_moved("robot/odom", std::nullopt, now_, effects_);
+  EXPECT_NE(services_.find_group(GroupIndex{1}), nullptr) << "it may come back";
+  services_.note_moved("robot/odom", away, now_, effects_);
+  EXPECT_EQ(services_.topics(), 0u);
+  const auto topic = services_.subscribe(kViewer, "robot/odom", {}, effects_, away);
+  ASSERT_TRUE(topic);
+  EXPECT_EQ((*topic)->away->group, away.group);
+}
+
 TEST_F(ServicesTest, TheOldestGroupsThatNobodyProvidesMakeRoomWhereFewAreLeft) {
   limits_.services_per_node = limits_.subscriptions_per_node = 2'000'000;
   constexpr std::uint32_t kHeldMost = kIndexMost / 4 * 3;

@@ -80,6 +80,17 @@ TEST_F(GroupTreesTest, JoinsOnceWithTheWidestTermsAndLeaves) {
   EXPECT_EQ(trees_.size(), 0u);
 }
 
+TEST_F(GroupTreesTest, AsksForTheLastMessageAgainWhereItHasJoined) {
+  trees_.want_anew(kGroup);
+  EXPECT_THAT(said(), IsEmpty());
+  trees_.want(kGroup, JoinTerms{});
+  trees_.want_anew(kGroup);
+  EXPECT_THAT(said(), ElementsAre("1 join 5:0/1"));
+  trees_.want_anew(kGroup);
+  EXPECT_THAT(said(), ElementsAre("1 join 5:0/1"));
+  EXPECT_THAT(said(), IsEmpty());
+}
+
 TEST_F(GroupTreesTest, AnswersAJoinWhenItsOwnWasAnswered) {
   trees_.take(kDown, join(kGroup));
   EXPECT_THAT(said(), ElementsAre("1 join 5:0/1"));

@@ -1,0 +1,85 @@
+#include "base/id_text.hpp"
+#include "tests/sim/hubs/world.hpp"
+
+// Looks at a world that was left alone: services whose subscribers are at all hubs.
+
+namespace gimnet::sim::hubs {
+namespace {
+
+constexpr std::size_t kServicesMost = 3;
+/// A subscription is answered after 1 s at the latest; of one link, with its jitter: 60 ms.
+constexpr std::uint64_t kAnswerMs = 1'200;
+constexpr std::uint64_t kSlowestMs = 60;
+
+struct Given {
+  SimNode* node;
+  GroupId group;
+  std::uint64_t last = 0;  ///< 0: none
+};
+
+std::uint64_t last_of(const std::vector<std::uint64_t>& heard) {
+  return heard.empty() ? 0 : heard.back();
+}
+
+}  // namespace
+
+/// The operators subscribe only now, and get what the one at the provider's hub gets.
+void Settled::check_groups() {
+  const milliseconds way{kAnswerMs + kSlowestMs * distance_.size()};
+  std::vector<Given> all;
+  for (SimNode& node : world_.nodes_) {
+    const bool whole = node.is_up() && node.given() && node.name() == node.plan().name;
+    if (!whole || node.name().starts_with("shared")) continue;
+    all.push_back({&node, *node.given()});
+    if (all.size() == kServicesMost) break;
+  }
+  if (all.empty()) return;
+  const auto near = [this](const SimNode& person, const Given& each) {
+    const int links = distance_[person.plan().hub][each.node->at()];
+    return person.is_up() && links >= 0 && links <= proto::kHopsMax;
+  };
+  // A hub that joined in time of faults, and then all.
+  const auto check_parents = [&](bool all_joined) {
+    for (const Given& each : all) {
+      for (std::size_t hub = 0; hub < distance_.size(); ++hub) {
+        const int links = distance_[hub][each.node->at()];
+        if (links <= 0 || links > proto::kHopsMax) continue;
+        const SimHub& there = *world_.machines_[hub].hub;
+        const hub::GroupMembers* const members = there.groups().find_away(each.group);
+        const hub::NextHop next = there.routes().find(hub_of(each.group));
+        if (members == nullptr && !all_joined) continue;
+        if (members == nullptr || members->parent != next.neighbour)
+          broken(Checker::parents, "hub " + std::to_string(hub) + " takes group " +
+                                       to_string(each.group) + " of another than its next hop");
+      }
+    }
+  };
+  check_parents(false);
+  const auto check = [&](const char* when) {
+    for (const Given& each : all) {
+      for (SimNode& person : world_.operators_) {
+        const std::uint64_t last = last_of(person.heard(each.group));
+        if (!near(person, each) || last == each.last) continue;
+        broken(Checker::subscribers, std::string{when} + " of group " + to_string(each.group) +
+                                         " at hub " + std::to_string(person.plan().hub) + " is " +
+                                         std::to_string(last) + ", and not " +
+                                         std::to_string(each.last));
+      }
+    }
+  };
+  // One after the other: a hub on the way has joined when the next subscriber comes.
+  for (SimNode& person : world_.operators_) {
+    for (const Given& each : all)
+      if (near(person, each)) person.subscribe(each.node->name());
+    world_.run_until(world_.now() + milliseconds{20});
+  }
+  world_.run_until(world_.now() + way);
+  for (Given& each : all) each.last = last_of(world_.operators_[each.node->at()].heard(each.group));
+  check("the last message");
+  for (Given& each : all) each.last = each.node->publish();
+  world_.run_until(world_.now() + way);
+  check("the next message");
+  check_parents(true);
+}
+
+}  // namespace gimnet::sim::hubs
