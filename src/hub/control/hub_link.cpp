@@ -108,6 +108,18 @@ bool HubLink::hear_keep_alive(const proto::route::KeepAlive& heard, milliseconds
   return cost_.note_round_trip(clock_.round_trip_least);
 }
 
+/// A process that lost its power was heard a moment ago, too. A keep-alive may have been under way
+/// when the question came, so one that comes at least an interval later counts.
+HubLink::Alive HubLink::is_alive(milliseconds now) {
+  const milliseconds interval{keep_alive_ms_};
+  if (!connected_ || now - heard_at_ >= 2 * interval) return Alive::no;
+  if (!asked_at_ || now - *asked_at_ > 20 * interval) asked_at_ = now;
+  if (now - *asked_at_ < 2 * interval) return Alive::not_known;
+  const bool heard_since = heard_at_ - *asked_at_ >= interval;
+  asked_at_.reset();
+  return heard_since ? Alive::yes : Alive::no;
+}
+
 void HubLink::compare_clocks(ClockSample sample) {
   // Each sample is right to half of its round trip. One that contradicts the others shows that a
   // clock was set, and they are worth nothing.

@@ -84,7 +84,10 @@ class HubLink {
   /// True: the cost is another one now.
   [[nodiscard]] bool hear_keep_alive(const proto::route::KeepAlive& heard,
                                      std::chrono::milliseconds now, std::int64_t wall_ns);
-  [[nodiscard]] std::chrono::milliseconds heard_at() const { return heard_at_; }
+  enum class Alive : std::uint8_t { yes, no, not_known };
+  /// Is the other end there? To be asked again if that is not known: it shows within two
+  /// keep-alives.
+  [[nodiscard]] Alive is_alive(std::chrono::milliseconds now);
   [[nodiscard]] std::uint16_t cost() const { return cost_.value().value_or(LinkCost::kUnmeasured); }
   [[nodiscard]] const LinkClock& clock() const { return clock_; }
   /// LinkClock::ahead, if the shard has to be told of it: less than a millisecond changes nothing.
@@ -131,7 +134,8 @@ class HubLink {
   std::uint32_t silent_ms_ = kLinkSilentMs;
   std::chrono::milliseconds keep_alive_at_{};
   std::chrono::milliseconds heard_at_{};
-  std::int64_t heard_sent_ns_ = 0;  ///< of the last keep-alive heard; 0: none
+  std::optional<std::chrono::milliseconds> asked_at_;  ///< whether it is alive
+  std::int64_t heard_sent_ns_ = 0;                     ///< of the last keep-alive heard; 0: none
   std::int64_t heard_ns_ = 0;
   LinkCost cost_;
   LinkClock clock_;

@@ -38,6 +38,8 @@ std::optional<Goodbye> LinkHandshake::refusal_of(const proto::HubIntroduction& s
     case LinkAdmission::is_self:
       return Goodbye{GoodbyeCode::copied, "the link leads back to the same hub; name another one"};
     case LinkAdmission::ask_old_link:
+      return Goodbye{GoodbyeCode::draining,
+                     "the hub with this state folder was heard a moment ago; try again"};
     case LinkAdmission::is_copy:
       return Goodbye{GoodbyeCode::copied,
                      "another hub with the same state folder is linked already; delete the state "

@@ -68,16 +68,16 @@ std::optional<Goodbye> Links::admit(Stranger& stranger, const proto::Hello& hell
 }
 
 /// A hub that started again is the one that its old link leads to; a copy of it is another one, and
-/// the first one was heard within two keep-alives.
+/// the first one goes on to be heard.
 std::optional<Goodbye> Links::judge(const proto::HubIntroduction& said, Moment moment) {
-  const LinkAdmissionAnswer answer = network_.admit({said.hub, said.instance, said.configured});
+  LinkAdmissionAnswer answer = network_.admit({said.hub, said.instance, said.configured});
   if (answer.admission == LinkAdmission::draw_again) draw_again();
   if (answer.admission != LinkAdmission::ask_old_link) return handshake_.refusal_of(said, answer);
   HubLink* old = find(answer.old_link);
   if (old == nullptr) return std::nullopt;
-  const bool alive =
-      old->connected() && moment.now - old->heard_at() < milliseconds{2 * old->keep_alive_ms()};
-  if (alive) return handshake_.refusal_of(said, answer);
+  const HubLink::Alive alive = old->is_alive(moment.now);
+  if (alive == HubLink::Alive::yes) answer.admission = LinkAdmission::is_copy;
+  if (alive != HubLink::Alive::no) return handshake_.refusal_of(said, answer);
   close(*old, GoodbyeCode::replaced, "the hub started again");
   end_connection(*old, true, moment);
   return std::nullopt;

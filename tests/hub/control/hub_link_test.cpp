@@ -48,6 +48,28 @@ TEST(HubLink, MayComeBackForItsTimeAndFourRoundTrips) {
   EXPECT_EQ(link.resume_until(), milliseconds{2'000 + 300 + 80});
 }
 
+TEST(HubLink, IsAliveIfItIsHeardWellAfterTheQuestion) {
+  const milliseconds interval{kLinkKeepAliveMs};
+  for (const bool lives : {true, false}) {
+    HubLink link(LinkNumber{1}, "up");
+    link.begin_connection(introduction(), {}, milliseconds{1'000});
+    const auto hear = [&link](milliseconds now) {
+      static_cast<void>(link.hear_keep_alive({}, now, 0));
+    };
+    const milliseconds asked{5'000};
+    hear(asked - milliseconds{1});
+    EXPECT_EQ(link.is_alive(asked), HubLink::Alive::not_known);
+    hear(asked + milliseconds{1});  // was under way
+    EXPECT_EQ(link.is_alive(asked + interval), HubLink::Alive::not_known);
+    if (lives) hear(asked + interval + milliseconds{1});
+    EXPECT_EQ(link.is_alive(asked + 2 * interval),
+              lives ? HubLink::Alive::yes : HubLink::Alive::no);
+    EXPECT_EQ(link.is_alive(asked + 10 * interval), HubLink::Alive::no) << "long silent";
+    link.end_connection(false, asked);
+    EXPECT_EQ(link.is_alive(asked), HubLink::Alive::no);
+  }
+}
+
 TEST(HubLink, AClockThatWasSetMeanwhileTellsNothing) {
   HubLink link(LinkNumber{1}, "up");
   link.begin_connection(introduction(), {}, milliseconds{0});
