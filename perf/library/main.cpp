@@ -308,7 +308,7 @@ Findings make_requests(LibraryClient& client, const LibraryClient::Setup& setup,
   std::uint64_t number = 0;
   const auto one_turn = [&](std::vector<std::int64_t>& times_ns, auto go) {
     for (std::uint64_t count = 0; count < kTurn; ++count) {
-      store_le(payload.data(), make_stamp(kThere, number++));
+      store_le(payload.data(), make_stamp(kData, number++));
       const auto begin = Clock::now();
       go();
       times_ns.push_back((Clock::now() - begin).count());
@@ -346,8 +346,7 @@ Findings make_requests(LibraryClient& client, const LibraryClient::Setup& setup,
 
 [[noreturn]] void answer_requests(LibraryClient& client, const LibraryClient::Setup& setup) {
   client.answer(setup);
-  say_ready();
-  for (;;) static_cast<void>(client.wait(Clock::now() + kAskAgain));
+  serve(client);
 }
 
 [[noreturn]] void echo(LibraryClient& client, const LibraryClient::Setup& setup) {
