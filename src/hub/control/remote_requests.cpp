@@ -54,6 +54,8 @@ bool RemoteRequests::take(const ControlFrameEvent& event, milliseconds now) {
   const auto control = proto::split_control(payload_of(event));
   if (!control) return false;
   if (control->header.is_answer()) {
+    // Only hubs answer: a node could say for its hub that a name is let go.
+    if (index_of(NodeId{header.src}) != kHubIndex) return false;
     const HubId answers = hub_of(NodeId{header.src});
     if (index_of(dst) == kHubIndex) {
       own_answers_.push_back(

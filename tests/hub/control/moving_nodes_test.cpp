@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "base/endian.hpp"
 #include "hub/control/remote_requests.hpp"
 #include "proto/control/ns_register.hpp"
 #include "tests/hub/control/support/link_rig.hpp"
@@ -56,6 +57,10 @@ TEST(MovingNodes, AreAdmittedWhenTheirFormerHubHasAnswered) {
   ControlFrameEvent event{{}, 1, make_id<NodeId>(HubId{2}, kHubIndex), {}};
   event.frame =
       control_frame(proto::Kind::ns, make_id<NodeId>(HubId{1}, kHubIndex), HubId{2}, answer);
+  auto forged = event;
+  store_le(forged.frame.data() + proto::kSrcOffset, make_id<NodeId>(HubId{2}, 7).value());
+  EXPECT_FALSE(rig.requests.take(forged, rig.a.now));
+  EXPECT_TRUE(rig.requests.take_own_answers().empty()) << "a node answers for no hub";
   EXPECT_FALSE(rig.requests.take(event, rig.a.now));
   EXPECT_EQ(rig.settle(rig.requests.take_own_answers()), 1u);
   EXPECT_FALSE(rig.moving.next_due());

@@ -124,7 +124,8 @@ proto::Payload handle_let_go(HandlerContext& context, const Request& request) {
         if (context.membership.let_go({wanted.token, wanted.name, identity, context.wall},
                                       context.now, context.effects))
           return ns::LetGoAnswer{};
-        return proto::Refusal{Status::not_found, "the token is not honoured at this hub"};
+        return proto::Refusal{Status::not_found,
+                              "the token is not honoured at this hub, or the name is another's"};
       });
 }
 

@@ -82,7 +82,8 @@ class Membership {
                    Effects& effects, const KeepNow& keep = {});
 
   /// A node of this hub has shown its token to another hub, and is its node from now on: its
-  /// session ends, and its token counts as none. False: the token is not honoured here.
+  /// session ends, and its token counts as none. False: the token is not honoured here, or another
+  /// node of this hub, or a service, has the name.
   [[nodiscard]] bool let_go(const Sessions::Presented& presented, std::chrono::milliseconds now,
                             Effects& effects);
 

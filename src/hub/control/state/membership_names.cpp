@@ -69,16 +69,21 @@ std::optional<proto::Refusal> Membership::service_name_refusal(std::string_view 
 
 bool Membership::let_go(const Sessions::Presented& presented, milliseconds now, Effects& effects) {
   const Sessions::Claim claim = sessions_.claim(presented);
+  if (!claim.token && claim.session == nullptr) return false;
   if (claim.token) sessions_.spend_token(*claim.token);
-  if (claim.session == nullptr) return claim.token.has_value();
-  sessions_.spend_token(*claim.session);
-  if (claim.session->connected)
-    effects.emplace_back(
-        CloseDue{claim.session->place, GoodbyeCode::replaced,
-                 "another connection has shown the token at another hub of the network, and is "
-                 "this node now; do not come back by yourself"});
-  end(*claim.session, now, effects);
-  return true;
+  if (claim.session != nullptr) {
+    sessions_.spend_token(*claim.session);
+    if (claim.session->connected)
+      effects.emplace_back(
+          CloseDue{claim.session->place, GoodbyeCode::replaced,
+                   "another connection has shown the token at another hub of the network, and is "
+                   "this node now; do not come back by yourself"});
+    end(*claim.session, now, effects);
+  }
+  // The name is wanted, and need not be that of the token: the asking hub would take it from its
+  // holder.
+  const Topic* const topic = services_.find(presented.name);
+  return !directory_.find(presented.name) && (topic == nullptr || !topic->provided());
 }
 
 void Membership::lose_name(const std::string& name, NodeId holder, const std::string& sentence,

@@ -102,6 +102,19 @@ TEST_F(MembershipNetworkTest, ASessionIsLetGoForItsTokenAloneAndOnce) {
   EXPECT_FALSE(membership_.let_go({token, "robot", Identity::open(), 1s}, 1s, effects_));
 }
 
+TEST_F(MembershipNetworkTest, ATokenDoesNotLetGoOfTheNameOfAnother) {
+  ASSERT_TRUE(
+      membership_.services().advertise(join("robot")->index, "robot/odom", {}, 1s, effects_));
+  for (const char* name : {"robot", "robot/odom"}) {
+    Session* node = join("mine");
+    membership_.sessions().renew_token(*node, 1s);
+    const std::vector<std::byte> token = membership_.sessions().token_of(*node);
+    EXPECT_FALSE(membership_.let_go({token, name, Identity::open(), 1s}, 1s, effects_)) << name;
+    EXPECT_FALSE(membership_.directory().find("mine")) << "it has moved, whatever its name is";
+  }
+  EXPECT_TRUE(membership_.directory().find("robot"));
+}
+
 TEST_F(MembershipNetworkTest, NodesAndFullNamesOfServicesExcludeEachOther) {
   put("robot/laser", 1, proto::route::NameState::held, make_id<GroupId>(kOther.hub, 1));
   put("other/laser", 2);
