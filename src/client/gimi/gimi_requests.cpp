@@ -5,6 +5,7 @@
 #include "base/clock.hpp"
 #include "client/gimi/api.hpp"
 #include "client/gimi/hub_records.hpp"
+#include "proto/control/names.hpp"
 
 // The C API: requests and their answers.
 
@@ -57,6 +58,8 @@ struct RequestStorage {
 
 /// Finds who answers a service. Nobody: it waits for a moment where the hub cannot be sure of that.
 Outcome<void> reach(Core& core, const std::string& service, std::int64_t deadline_ns) {
+  if (const char* fault = proto::service_full_name_fault(service))
+    return Failure{Status::bad_name, "cannot ask '" + service + "': " + fault};
   OpenRequests& requests = core.requests();
   const std::int64_t give_up_ns =
       std::min(deadline_ns, steady_now_ns() + OpenRequests::kRetryForNs);

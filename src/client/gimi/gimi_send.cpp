@@ -53,6 +53,11 @@ Outcome<StreamTable::Stream> stream_to_service(Core& core, const std::string& na
     return Failure{Status::not_found,
                    "cannot send to '" + name + "': it gives data and takes none; subscribe to it"};
   }
+  if (service->answers() && !on_place) {
+    return Failure{Status::not_found,
+                   "cannot send to '" + name +
+                       "': it answers questions and takes no data; ask it by request()"};
+  }
   StreamTable& streams = core.streams();
   if (const auto ended = streams.make_place(name))
     core.services().unfollow(*ended, [&] { return streams.has_service(*ended); });

@@ -196,10 +196,10 @@ Outcome<ServiceTable::Reading> ServiceTable::subscribe(const std::string& full_n
     return failure;
   }
   // It may have been subscribed before, to know where it is or when it was another one.
-  if (!service->accepts()) return reading;
+  const char* const why = service->gives_none();
+  if (why == nullptr) return reading;
   leave(reading);
-  return Failure{Status::not_found, "cannot subscribe to '" + full_name +
-                                        "': it takes data and gives none; send to it"};
+  return Failure{Status::not_found, "cannot subscribe to '" + full_name + "': it " + why};
 }
 
 void ServiceTable::unsubscribe(const Reading& reading) {

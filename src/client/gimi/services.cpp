@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "client/gimi/ending.hpp"
+#include "proto/gimi/request.hpp"
 
 namespace gimnet::gimi {
 
@@ -230,15 +231,26 @@ bool SubscribedService::accepts() {
   return accepts_;
 }
 
+const char* SubscribedService::gives_none() {
+  const MutexLock lock(mutex_);
+  return reason();
+}
+
+const char* SubscribedService::reason() const {
+  if (!accepts_) return nullptr;
+  return answers_ ? "answers questions and gives no data; ask it by request()"
+                  : "takes data and gives none; send to it";
+}
+
 Outcome<void> SubscribedService::wait_until_exists(Timeout timeout) {
   const std::int64_t deadline = deadline_after(timeout);
   const MutexLock lock(mutex_);
   while (!exists_) {
     if (end_) return end_.failure("wait for " + name_->text);
     if (is_over(deadline)) {
-      return Failure{Status::timeout, accepts_
-                                          ? name_->text + " takes data and gives none; send to it"
-                                          : "nobody provides " + name_->text + " yet"};
+      const char* const why = reason();
+      return Failure{Status::timeout, why != nullptr ? name_->text + " " + why
+                                                     : "nobody provides " + name_->text + " yet"};
     }
     static_cast<void>(changed_.wait_until(mutex_, deadline));
   }
@@ -321,6 +333,7 @@ void SubscribedService::on_place(const ServicePlace& now) {
   const MutexLock lock(mutex_);
   exists_ = now.destination() != 0 && !now.accepts;
   accepts_ = now.destination() != 0 && now.accepts;
+  answers_ = accepts_ && now.key.type == proto::gimi::kRequestType;
   if (now.group != 0 && std::exchange(latest_, now.latest) != now.latest) {
     for (const SharedReader& reader : readers_)
       inbox_.set(reader->queue, reader->queue_options(latest_));

@@ -143,6 +143,8 @@ class SubscribedService {
   [[nodiscard]] bool exists() GIMNET_EXCLUDES(mutex_);
   /// There is one who takes data under that name: nothing will come.
   [[nodiscard]] bool accepts() GIMNET_EXCLUDES(mutex_);
+  /// Null, or words for people: it takes data or questions instead.
+  [[nodiscard]] const char* gives_none() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] Outcome<void> wait_until_exists(Timeout timeout) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] Outcome<void> standing() GIMNET_EXCLUDES(mutex_);
   /// The hub did not take the subscription again, and was not asked since.
@@ -188,6 +190,7 @@ class SubscribedService {
     StreamEpochs epochs;
   };
   [[nodiscard]] Stream* find(const Position& message) GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] const char* reason() const GIMNET_REQUIRES(mutex_);
   /// One of its messages is about to be put into queues: whoever takes it knows what is missing
   /// before it.
   void count_missed(const Position& message) GIMNET_REQUIRES(mutex_);
@@ -203,6 +206,7 @@ class SubscribedService {
   bool latest_ GIMNET_GUARDED_BY(mutex_) = false;  ///< its delivery
   bool exists_ GIMNET_GUARDED_BY(mutex_) = false;
   bool accepts_ GIMNET_GUARDED_BY(mutex_) = false;
+  bool answers_ GIMNET_GUARDED_BY(mutex_) = false;
   std::optional<Failure> refusal_ GIMNET_GUARDED_BY(mutex_);
   Position last_ GIMNET_GUARDED_BY(mutex_);                ///< from nobody: nothing came yet
   Position counted_ GIMNET_GUARDED_BY(mutex_);             ///< by count_missed(), last

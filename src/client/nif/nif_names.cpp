@@ -167,8 +167,7 @@ nif_status nif_advertise(nif_node* node, const nif_service* service, uint32_t* g
       return fail(NIF_BAD_ARGUMENT,
                   "cannot advertise: direction or delivery is not one of its enumeration");
     }
-    if (const nif_status status = check_name(known->name, "advertise"); status != NIF_OK)
-      return status;
+    if (const nif_status status = check_name(known->name, "offer"); status != NIF_OK) return status;
     ns::Advertise request;
     request.service = known->name;
     request.message_type = known->message_type;
@@ -180,7 +179,7 @@ nif_status nif_advertise(nif_node* node, const nif_service* service, uint32_t* g
     request.retain = known->retain != 0;
     if (!proto::valid_service_name(request.service)) {
       return fail(NIF_BAD_NAME,
-                  "cannot advertise '" + request.service + "': a service's name has one part");
+                  "cannot offer '" + request.service + "': a service's name has one part");
     }
     ns::AdvertiseAnswer answer;
     const Deadline deadline = deadline_after(timeout_ms);

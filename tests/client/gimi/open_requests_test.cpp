@@ -72,6 +72,21 @@ TEST_F(OpenRequestsTest, OneThatTheProgramLetsGoMayHaveBeenDone) {
   answering.join();
 }
 
+TEST_F(OpenRequestsTest, ANameIsThatOfOneService) {
+  for (const char* service : {"", "*", "calc", "calc/*", "a//b"}) {
+    const Reply reply = asker_.request(service, "", kWait);
+    EXPECT_TRUE(reply.is(Status::bad_name)) << service;
+    EXPECT_EQ(reply.failure().sentence.find("cannot ask '"), 0u) << reply.failure().sentence;
+    EXPECT_EQ(reply.ran(), Ran::no);
+  }
+}
+
+TEST_F(OpenRequestsTest, ASenderIsToldToAsk) {
+  EXPECT_EQ(asker_.sender("calc/add").failure().sentence,
+            "cannot send to 'calc/add': it answers questions and takes no data; ask it by "
+            "request()");
+}
+
 TEST_F(OpenRequestsTest, NobodyAnswersThere) {
   const Queue drive = calc_->accept("drive").or_throw();
   const Publisher odom = calc_->advertise("odom").or_throw();

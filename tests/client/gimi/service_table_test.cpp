@@ -255,11 +255,9 @@ TEST_F(Services, OnlyWhatAcceptsCanBeSentTo) {
   const Node viewer = join();
   EXPECT_TRUE(viewer.sender("robot/odom").is(Status::not_found));
   EXPECT_TRUE(viewer.sender("robot/drive").is(Status::not_found)) << "not there yet";
-  EXPECT_TRUE(viewer.sender("robot/*").is(Status::not_found))
-      << "one service, not a pattern";
+  EXPECT_TRUE(viewer.sender("robot/*").is(Status::not_found)) << "one service, not a pattern";
   EXPECT_TRUE(viewer.sender("a//b").is(Status::bad_name));
-  EXPECT_TRUE(
-      viewer.sender("robot/odom", synchronized(kWindowMax + 1)).is(Status::not_found));
+  EXPECT_TRUE(viewer.sender("robot/odom", synchronized(kWindowMax + 1)).is(Status::not_found));
 }
 
 TEST_F(Services, ASenderFollowsAServiceThatGoesAndComesBack) {
@@ -329,6 +327,12 @@ TEST_F(Services, OnlyWhatGivesDataCanBeSubscribed) {
   ASSERT_TRUE(refused.is(Status::not_found));
   EXPECT_EQ(refused.failure().sentence,
             "cannot subscribe to 'robot/drive': it takes data and gives none; send to it");
+  {
+    const Answers answers = robot->answer("add").or_throw();
+    EXPECT_EQ(late.subscribe("robot/add").failure().sentence,
+              "cannot subscribe to 'robot/add': it answers questions and gives no data; ask it by "
+              "request()");
+  }
   EXPECT_TRUE(
       eventually([&] { return viewer.services("robot/drive").or_throw().at(0).subscribers == 1; }));
   // It may become one that provides.
@@ -349,6 +353,8 @@ TEST_F(Services, AreRefusedWithWords) {
   EXPECT_TRUE(again.is(Status::taken));
   EXPECT_NE(again.failure().sentence.find("robot/odom"), std::string::npos);
   EXPECT_TRUE(robot.advertise("no spaces").is(Status::bad_name));
+  EXPECT_EQ(robot.accept("a/b").failure().sentence,
+            "cannot offer 'a/b': a service's name has one part");
   EXPECT_TRUE(join().advertise("odom").is(Status::denied));
   EXPECT_TRUE(robot.subscribe("").is(Status::bad_name));
 }
