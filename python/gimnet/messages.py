@@ -160,6 +160,8 @@ class NodeRecord:
                    raw.place.decode(), raw.joined_ms / 1e3, raw.services, bool(raw.connected))
 
 
+LANES = {"real_time": _c.GIMI_LANE_REAL_TIME, "normal": _c.GIMI_LANE_NORMAL, "bulk": _c.GIMI_LANE_BULK,
+         "background": _c.GIMI_LANE_BACKGROUND}
 DELIVERIES = {"stream": _c.GIMI_STREAM, "latest": _c.GIMI_LATEST, "sync": _c.GIMI_SYNC}
 _DELIVERY_NAMES = {number: name for name, number in DELIVERIES.items()}
 

@@ -161,14 +161,17 @@ class Node(Waitable):
 
     def advertise(self, name: str, *, delivery: str = "stream", window: int = 0, retain: bool = False,
                   key: Tuple[int, int] = (0, 0), metadata: str = "", age_max: float = 0.0,
-                  timeout: float = 5.0) -> Publisher:
+                  lane: str = "normal", timeout: float = 5.0) -> Publisher:
         """Provides the service `own name/name`. `delivery`: stream, latest, or sync, at most `window`
-        messages that a subscriber has not taken. `age_max`: dropped on the way when older. BadName, Taken,
-        Denied (a node without a name)."""
+        messages that a subscriber has not taken. `age_max`: dropped on the way when older. `lane`:
+        real_time, normal, bulk or background; a lower one goes first. BadName, Taken, Denied (a node without a
+        name)."""
         if delivery not in messages.DELIVERIES:
             raise errors.BadArgument(f"there is no delivery {delivery!r}: use {', '.join(messages.DELIVERIES)}")
+        if lane not in messages.LANES:
+            raise errors.BadArgument(f"there is no lane {lane!r}: use {', '.join(messages.LANES)}")
         options = sized(_c.gimi_publish_options, key=to_key(key), delivery=messages.DELIVERIES[delivery], window=window,
-                         retain=retain, metadata=to_text(metadata), timeout_ms=to_ms(timeout),
+                         lane=messages.LANES[lane], retain=retain, metadata=to_text(metadata), timeout_ms=to_ms(timeout),
                          age_ms_max=to_ms(age_max) if age_max else 0)
         return Publisher(self, self._opened(_c.lib.gimi_advertise, to_text(name), options))
 

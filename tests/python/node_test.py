@@ -158,6 +158,7 @@ class Nodes(unittest.TestCase):
                             (gimnet.BadArgument, lambda: self.viewer.receive(float("nan"))),
                             (gimnet.BadArgument, lambda: self.viewer.subscribe("robot/a", rate_hz=float("nan"))),
                             (gimnet.BadArgument, lambda: self.robot.advertise("a", delivery="often")),
+                            (gimnet.BadArgument, lambda: self.robot.advertise("a", lane="fast")),
                             (gimnet.NotFound, lambda: self.viewer.find("nobody"))):
             with self.assertRaises(wrong) as raised:
                 call()
