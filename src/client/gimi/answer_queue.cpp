@@ -30,6 +30,7 @@ Outcome<TakenRequest> AnswerQueue::receive(Timeout timeout) {
     }
     Waiting next = std::move(waiting_.front());
     waiting_.pop_front();
+    waiting_bytes_ -= next.message.size();
     source_.update(!waiting_.empty() || end_);
     if (!is_over(next.deadline_ns)) {
       const std::int64_t left_ms =
@@ -130,7 +131,7 @@ bool AnswerQueue::on_request(const proto::gimi::MessageHeader& header, Message& 
     if (again) refuse(way, name, RequestFault::unknown);
     return false;
   }
-  if (waiting_.size() >= kWaitingMax) {
+  if (waiting_.size() >= kWaitingMax || waiting_bytes_ >= bytes_max_) {
     refuse(way, name, RequestFault::busy);
     return false;
   }
@@ -139,6 +140,7 @@ bool AnswerQueue::on_request(const proto::gimi::MessageHeader& header, Message& 
   const bool limited = left_ms != proto::gimi::kNoDeadline;
   const std::int64_t deadline =
       limited ? steady_now_ns() + std::int64_t{left_ms} * 1'000'000 : INT64_MAX;
+  waiting_bytes_ += message.size();
   waiting_.push_back({std::move(message), name, deadline});
   filled_.notify_one();
   source_.update(true);
@@ -153,6 +155,7 @@ void AnswerQueue::end(const Ending& ending) {
     if (!way.empty()) refuse(way.mapped(), waiting.name, RequestFault::withdrawn);
   }
   waiting_.clear();
+  waiting_bytes_ = 0;
   filled_.notify_all();
   source_.update(true);
 }
@@ -163,7 +166,7 @@ void AnswerQueue::visit(const SourceVisitor& visitor) {
 }
 
 AnswerTable::Added AnswerTable::add(const std::string& full_name) {
-  auto queue = std::make_shared<AnswerQueue>(uplink_, full_name);
+  auto queue = std::make_shared<AnswerQueue>(uplink_, full_name, bytes_max_);
   const MutexLock lock(mutex_);
   if (end_) queue->end(end_);
   MessageKey key{proto::gimi::kRequestType, Uplink::draw_epoch()};

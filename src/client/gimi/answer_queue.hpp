@@ -40,8 +40,9 @@ class AnswerQueue {
   static constexpr std::size_t kAnswersMax = 64;
   static constexpr std::size_t kAnswerBytesMax = std::size_t{1} << 20;
 
-  AnswerQueue(Uplink& uplink, std::string service)
-      : uplink_(uplink), service_(std::move(service)) {}
+  /// `bytes_max`: of requests that wait. Beyond it further ones are refused `busy`, too.
+  AnswerQueue(Uplink& uplink, std::string service, std::size_t bytes_max)
+      : uplink_(uplink), service_(std::move(service)), bytes_max_(bytes_max) {}
   [[nodiscard]] const std::string& service() const { return service_; }
 
   /// Takes the oldest request whose time is not over. Errors: timeout, closed.
@@ -89,11 +90,13 @@ class AnswerQueue {
 
   Uplink& uplink_;
   const std::string service_;
+  const std::size_t bytes_max_;
 
   Mutex mutex_;
   Condition filled_;
   WaitSource source_ GIMNET_GUARDED_BY(mutex_);
-  std::deque<Waiting> waiting_ GIMNET_GUARDED_BY(mutex_);             ///< Limit: kWaitingMax
+  std::deque<Waiting> waiting_ GIMNET_GUARDED_BY(mutex_);  ///< Limit: kWaitingMax, bytes_max_
+  std::size_t waiting_bytes_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::map<std::uint64_t, Way> open_ GIMNET_GUARDED_BY(mutex_);       ///< not answered
   std::deque<std::uint64_t> names_ GIMNET_GUARDED_BY(mutex_);         ///< Limit: kNamesMax
   std::unordered_set<std::uint64_t> came_ GIMNET_GUARDED_BY(mutex_);  ///< the same
@@ -107,7 +110,8 @@ class AnswerQueue {
 /// thread. Limits: those of the hub.
 class AnswerTable {
  public:
-  explicit AnswerTable(Uplink& uplink) : uplink_(uplink) {}
+  /// `bytes_max`: of the requests that wait at one service.
+  AnswerTable(Uplink& uplink, std::size_t bytes_max) : uplink_(uplink), bytes_max_(bytes_max) {}
 
   struct Added {
     std::shared_ptr<AnswerQueue> queue;
@@ -121,6 +125,7 @@ class AnswerTable {
 
  private:
   Uplink& uplink_;
+  const std::size_t bytes_max_;
   Mutex mutex_;
   std::map<std::uint32_t, std::shared_ptr<AnswerQueue>> queues_ GIMNET_GUARDED_BY(mutex_);
   Ending end_ GIMNET_GUARDED_BY(mutex_);

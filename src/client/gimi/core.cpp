@@ -59,7 +59,7 @@ Core::Core(const NodeOptions& options)
                 }),
       watches_(uplink_),
       requests_(uplink_, [this] { clerk_.attend(true); }),
-      answers_(uplink_),
+      answers_(uplink_, options.receive_bytes),
       clerk_(uplink_, streams_, &requests_, &inbox_),
       reception_(
           {uplink_, inbox_, streams_, services_, pings_, requests_, answers_, clerk_, losses_},

@@ -21,11 +21,13 @@ class AnswerQueueTest : public testing::Test {
  protected:
   /// Was it kept?
   bool ask(std::uint32_t sequence, std::uint8_t flags = 0, std::uint32_t left_ms = kNoDeadline) {
-    Message message = gimnet::test::make_message("x", sequence);
+    Message message = gimnet::test::make_message(data_, sequence);
     return queue_.on_request({sequence, Operation::request, flags, 0, 7}, message, left_ms);
   }
+  static constexpr std::size_t kBytesMax = 1000;
+  std::string data_ = "x";
   Uplink uplink_;
-  AnswerQueue queue_{uplink_, "calc/add"};
+  AnswerQueue queue_{uplink_, "calc/add", kBytesMax};
 };
 
 TEST_F(AnswerQueueTest, GivesRequestsOutInOrderWithTheTimeThatIsLeft) {
@@ -46,6 +48,16 @@ TEST_F(AnswerQueueTest, RefusesMoreThanItsLimit) {
   EXPECT_FALSE(ask(1000));
   static_cast<void>(queue_.receive(kNoWait).or_throw());
   EXPECT_TRUE(ask(1001));
+}
+
+TEST_F(AnswerQueueTest, RefusesMoreBytesThanItsLimit) {
+  data_.assign(kBytesMax - 1, 'x');
+  EXPECT_TRUE(ask(1));
+  EXPECT_TRUE(ask(2)) << "one goes beyond";
+  data_ = "x";
+  EXPECT_FALSE(ask(3));
+  static_cast<void>(queue_.receive(kNoWait).or_throw());
+  EXPECT_TRUE(ask(4));
 }
 
 TEST_F(AnswerQueueTest, DoesNotGiveOutWhatIsTooLate) {
@@ -112,10 +124,10 @@ TEST_F(AnswerQueueTest, NothingIsTakenAfterItsEnd) {
 
 TEST(AnswerTable, FindsAServiceByItsKey) {
   Uplink uplink;
-  AnswerTable table(uplink);
+  AnswerTable table(uplink, 1000);
   const auto added = table.add("calc/add");
   EXPECT_NE(table.add("calc/multiply").key, added.key);
-  EXPECT_NE(AnswerTable(uplink).add("calc/add").key, added.key)
+  EXPECT_NE(AnswerTable(uplink, 1000).add("calc/add").key, added.key)
       << "a program that was started anew";
   EXPECT_EQ(added.key.type, proto::gimi::kRequestType);
   EXPECT_EQ(table.find(added.key), added.queue);

@@ -318,7 +318,7 @@ TEST_F(WaitSetOfANodeTest, AQueueThatGoesTakesItsMessagesAlong) {
 }
 
 TEST_F(WaitSetOfANodeTest, AnAnsweringServiceIsReadyWhileRequestsWait) {
-  AnswerQueue answers{uplink_, "calc/add"};
+  AnswerQueue answers{uplink_, "calc/add", 1000};
   EXPECT_TRUE(join(set_, [&](const SourceVisitor& visitor) { answers.visit(visitor); }));
   EXPECT_EQ(ready(set_), Users{});
   Message late = test::make_message("x", 1);
