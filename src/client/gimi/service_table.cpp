@@ -182,7 +182,8 @@ Outcome<ServiceTable::Reading> ServiceTable::subscribe(const std::string& full_n
   const bool is_first = !service->is_read();
   const Reading reading{service, service->add(wish)};
   nif_status status = ask(service, wish.timeout);
-  if (status == NIF_OK && !is_first && service->retained) {
+  const bool ended = status == NIF_OK && !is_first && service->retained;
+  if (ended) {
     // The hub gives the last message to who begins, and this reader does.
     static_cast<void>(nif_unsubscribe(uplink_.node(), full_name.c_str(), kLeaveTimeoutMs));
     status = ask(service, wish.timeout);
@@ -191,7 +192,12 @@ Outcome<ServiceTable::Reading> ServiceTable::subscribe(const std::string& full_n
     auto failure = failure_of(status, "subscribe " + full_name);
     service->remove(*reading.reader);
     // As before: the hub does not know this one.
-    if (service->followed && is_first) static_cast<void>(ask(service, kNoWait));
+    if (ended) {
+      const nif_status again = ask(service, Timeout{kLeaveTimeoutMs});
+      if (again != NIF_OK) service->on_refused(failure_of(again, "subscribe " + full_name));
+    } else if (service->followed && is_first) {
+      static_cast<void>(ask(service, kNoWait));
+    }
     forget_unused(service);
     return failure;
   }

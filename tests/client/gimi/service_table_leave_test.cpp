@@ -27,7 +27,8 @@ class LeftSubscriptions : public testing::Test {
   ~LeftSubscriptions() override { connected_.hub.close(); }
 
   /// Answers the next SUBSCRIBE, which has to ask for that window.
-  void answer_subscribe(std::uint32_t window, proto::Status status = proto::Status::done) {
+  void answer_subscribe(std::uint32_t window, proto::Status status = proto::Status::done,
+                        bool retain = false) {
     std::uint16_t number = 0;
     const auto request = connected_.hub.next_request<ns::Subscribe>(number);
     ASSERT_TRUE(request);
@@ -35,6 +36,7 @@ class LeftSubscriptions : public testing::Test {
     ns::SubscribeAnswer answer;
     answer.group = GroupId{kGroup};
     answer.provider = NodeId{nif::test::kPeerId};
+    answer.retain = retain;
     const proto::ControlHeader header{ns::Subscribe::kOperation, number};
     connected_.hub.send_control(proto::Kind::ns,
                                 status == proto::Status::done
@@ -109,6 +111,23 @@ TEST_F(LeftSubscriptions, AllAsLongAsThereIsAReader) {
   EXPECT_EQ(table_.subscriptions(), 0u);
   EXPECT_EQ(table_.subscribed(kGroup).place, ServiceTable::Place::unwanted)
       << "what is still on its way is no loss";
+}
+
+TEST_F(LeftSubscriptions, WhatAFirstReaderHadIfASecondOneIsRefused) {
+  const ServiceTable::Reading first = subscribe();
+  std::thread asking(
+      [&] { EXPECT_FALSE(table_.subscribe(kName, {.timeout = kForever, .window = 2})); });
+  answer_subscribe(2, proto::Status::done, true);
+  std::uint16_t number = 0;
+  ASSERT_TRUE(connected_.hub.next_request<ns::Unsubscribe>(number));
+  connected_.hub.send_control(proto::Kind::ns,
+                              proto::encode_answer(ns::UnsubscribeAnswer{}, number));
+  answer_subscribe(2, proto::Status::limit);
+  answer_subscribe(2);
+  asking.join();
+  EXPECT_EQ(table_.subscribed(kGroup).service, first.service);
+  EXPECT_FALSE(first.service->is_refused());
+  leave(first);
 }
 
 TEST_F(LeftSubscriptions, NoMoreThanTheOthersWant) {
