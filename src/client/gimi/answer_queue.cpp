@@ -21,25 +21,33 @@ std::uint64_t name_of(const proto::gimi::MessageHeader& header) {
 Outcome<TakenRequest> AnswerQueue::receive(Timeout timeout) {
   const std::int64_t deadline = deadline_after(timeout);
   const MutexLock lock(mutex_);
-  for (;;) {
-    while (waiting_.empty()) {
-      if (end_) return end_.failure("take a request to " + service_);
-      if (is_over(deadline))
-        return Failure{Status::timeout, "no request came to " + service_ + " in the time given"};
-      static_cast<void>(filled_.wait_until(mutex_, deadline));
-    }
-    Waiting next = std::move(waiting_.front());
-    waiting_.pop_front();
-    waiting_bytes_ -= next.message.size();
-    source_.update(!waiting_.empty() || end_);
-    if (!is_over(next.deadline_ns)) {
-      const std::int64_t left_ms =
-          next.deadline_ns == INT64_MAX ? -1 : (next.deadline_ns - steady_now_ns()) / 1'000'000;
-      return TakenRequest{std::move(next.message), next.name, left_ms};
-    }
-    const auto way = open_.extract(next.name);
-    if (!way.empty()) refuse(way.mapped(), next.name, RequestFault::late);
+  for (drop_late(); waiting_.empty(); drop_late()) {
+    if (end_) return end_.failure("take a request to " + service_);
+    if (is_over(deadline))
+      return Failure{Status::timeout, "no request came to " + service_ + " in the time given"};
+    static_cast<void>(filled_.wait_until(mutex_, deadline));
   }
+  Waiting next = std::move(waiting_.front());
+  waiting_.pop_front();
+  waiting_bytes_ -= next.message.size();
+  source_.update(!waiting_.empty() || end_);
+  const std::int64_t left_ns = std::max<std::int64_t>(next.deadline_ns - steady_now_ns(), 0);
+  const std::int64_t left_ms = next.deadline_ns == INT64_MAX ? -1 : left_ns / 1'000'000;
+  return TakenRequest{std::move(next.message), next.name, left_ms};
+}
+
+void AnswerQueue::drop_late() {
+  for (auto each = waiting_.begin(); each != waiting_.end();) {
+    if (!is_over(each->deadline_ns)) {
+      ++each;
+      continue;
+    }
+    const auto way = open_.extract(each->name);
+    if (!way.empty()) refuse(way.mapped(), each->name, RequestFault::late);
+    waiting_bytes_ -= each->message.size();
+    each = waiting_.erase(each);
+  }
+  source_.update(!waiting_.empty() || end_);
 }
 
 nif_status AnswerQueue::send(const Way& way, std::uint64_t name, Operation operation,
@@ -131,7 +139,8 @@ bool AnswerQueue::on_request(const proto::gimi::MessageHeader& header, Message& 
     if (again) refuse(way, name, RequestFault::unknown);
     return false;
   }
-  if (waiting_.size() >= kWaitingMax || waiting_bytes_ >= bytes_max_) {
+  if (is_full()) drop_late();
+  if (is_full()) {
     refuse(way, name, RequestFault::busy);
     return false;
   }

@@ -85,6 +85,11 @@ class AnswerQueue {
   void refuse(const Way& way, std::uint64_t name, proto::gimi::RequestFault fault) const;
   [[nodiscard]] Outcome<void> answer(std::uint64_t name, proto::gimi::Operation operation,
                                      BytesView data, Timeout timeout) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] bool is_full() const GIMNET_REQUIRES(mutex_) {
+    return waiting_.size() >= kWaitingMax || waiting_bytes_ >= bytes_max_;
+  }
+  /// Nobody waits for these any more.
+  void drop_late() GIMNET_REQUIRES(mutex_);
   void keep(Answer answer) GIMNET_REQUIRES(mutex_);
   void remember(std::uint64_t name) GIMNET_REQUIRES(mutex_);
 

@@ -50,6 +50,14 @@ TEST_F(AnswerQueueTest, RefusesMoreThanItsLimit) {
   EXPECT_TRUE(ask(1001));
 }
 
+TEST_F(AnswerQueueTest, RefusesNoneForThoseThatAreTooLate) {
+  for (std::uint32_t i = 1; i <= AnswerQueue::kWaitingMax; ++i)
+    EXPECT_TRUE(ask(i, 0, i % 2 * 60'000));
+  EXPECT_TRUE(ask(1000));
+  EXPECT_EQ(static_cast<std::uint32_t>(queue_.receive(kNoWait).or_throw().name), 1u);
+  EXPECT_EQ(static_cast<std::uint32_t>(queue_.receive(kNoWait).or_throw().name), 3u);
+}
+
 TEST_F(AnswerQueueTest, RefusesMoreBytesThanItsLimit) {
   data_.assign(kBytesMax - 1, 'x');
   EXPECT_TRUE(ask(1));
