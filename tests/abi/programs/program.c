@@ -53,7 +53,7 @@ static int use_messages(gimi_handle node) {
   gimi_loaned loan;
   EXPECT(gimi_advertise(node, "odom", GIMI_OPTIONS(gimi_publish_options, .key = {3, 4}),
                         &publisher) == GIMI_OK);
-  EXPECT(gimi_subscribe(node, "kept/odom", GIMI_OPTIONS(gimi_subscribe_options, .messages = 8),
+  EXPECT(gimi_subscribe(node, "kept/odom", GIMI_OPTIONS(gimi_subscribe_options, .queue = 8),
                         &subscription) == GIMI_OK);
   EXPECT(gimi_wait_for_subscribers(publisher, 1, WAIT_MS) == GIMI_OK);
   EXPECT(gimi_publish(publisher, "x 1.0", 5, WAIT_MS, 0) == GIMI_OK);

@@ -15,6 +15,7 @@ TEST(NsRegisterMessages, AreDecodedAndWrittenAsTheVectorsSay) {
   test::expect_request("ns/unregister", 10, UnregisterName{});
   test::expect_answer("ns/unregister_answer", 10, UnregisterNameAnswer{token()});
   test::expect_request("ns/let_go", 9, LetGo{"robot/base", token(), 1000});
+  test::expect_answer("ns/let_go_answer", 9, LetGoAnswer{});
   test::expect_request("ns/name_lost", 0,
                        NameLost{"robot/base", NodeId{0x00800012}, "it was there first"});
 }
