@@ -173,7 +173,7 @@ class Executor {
       const Id id = place->first;
       const auto timer = place->second;
       if (timer->due <= now) {
-        timer->due = std::max(timer->due + timer->period, now);
+        timer->due += ((now - timer->due) / timer->period + 1) * timer->period;
         timer->call();
       }
       place = timers_.upper_bound(id);

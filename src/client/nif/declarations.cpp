@@ -155,7 +155,7 @@ bool Declarations::on_service_moved(const proto::ns::ServiceMoved& event) {
     const auto beginning = beginning_.find(event.name);
     if (beginning == beginning_.end()) return true;
     credits_.open(event.group, event.window, beginning->second);
-    answered_.push_back(event.group);
+    answered_.insert(event.group.value());
     return true;
   }
   const GroupId former = std::exchange(found->second.group, event.group);
@@ -382,7 +382,7 @@ bool Declarations::may_wait(GroupId group, std::size_t bytes) {
     return true;
   }
   const MutexLock lock(mutex_);
-  if (std::ranges::find(answered_, group) != answered_.end() || is_subscribed(group)) return true;
+  if (answered_.contains(group.value()) || is_subscribed(group)) return true;
   if (bytes > kUnknownBytesMax - unknown_bytes_) {
     ++unknown_lost_;
     return false;

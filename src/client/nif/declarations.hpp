@@ -6,6 +6,7 @@
 #include <deque>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -81,7 +82,7 @@ class Declarations {
   /// The hub answered a SUBSCRIBE: messages of that group follow, before the program knows.
   void on_subscribe_answer(GroupId group) GIMNET_EXCLUDES(mutex_) {
     const MutexLock lock(mutex_);
-    if (subscribing_.load() != 0) answered_.push_back(group);
+    if (subscribing_.load() != 0) answered_.insert(group.value());
   }
   /// Of groups that the program has not subscribed so many bytes may wait in the receive queue
   /// while a SUBSCRIBE is unanswered. Then a full queue cannot keep the answer from being read.
@@ -161,7 +162,7 @@ class Declarations {
   std::uint8_t next_number_ GIMNET_GUARDED_BY(mutex_) = 0;
   /// Groups of which the hub told while a SUBSCRIBE of the program is unanswered. Limit: requests
   /// that are answered or given up meanwhile.
-  std::vector<GroupId> answered_ GIMNET_GUARDED_BY(mutex_);
+  std::set<std::uint32_t> answered_ GIMNET_GUARDED_BY(mutex_);
   std::atomic<std::size_t> subscribing_{0};  ///< SUBSCRIBEs for which the program waits
 
   // The library's thread.

@@ -169,6 +169,20 @@ TEST_F(ExecutorTest, CallsBackForWhatComesUntilItIsStopped) {
   EXPECT_EQ(ticks, 3);
 }
 
+TEST_F(ExecutorTest, LeavesOutTheCallsThatWereMissed) {
+  constexpr std::chrono::milliseconds kPeriod{20};
+  const auto begin = std::chrono::steady_clock::now();
+  std::vector<std::chrono::steady_clock::time_point> called;
+  executor_.every(kPeriod, [&] {
+    called.push_back(std::chrono::steady_clock::now());
+    if (called.size() == 3) executor_.stop();
+    while (called.size() == 1 && std::chrono::steady_clock::now() < called[0] + 7 * kPeriod / 2)
+      std::this_thread::yield();
+  });
+  executor_.run().or_throw();
+  EXPECT_GE(called[2], begin + 5 * kPeriod) << "in time again after the second call";
+}
+
 TEST_F(ExecutorTest, EndsWhenNothingIsLeftToWaitFor) {
   auto [pose, seen] = pair("pose");
   executor_.on(seen, [&](const Message&) { viewer_.close(); }).or_throw();
