@@ -38,7 +38,7 @@ class World final : public nif::InboundHost {
         streams_(uplink_, [](bool) {}),
         services_(uplink_, inbox_, [](const std::string&, const ServicePlace&) {}),
         requests_(uplink_, [] {}),
-        answers_(uplink_),
+        answers_(uplink_, 1 << 20),
         clerk_(uplink_, streams_, &requests_),
         reception_(
             {uplink_, inbox_, streams_, services_, pings_, requests_, answers_, clerk_, losses_},
