@@ -43,7 +43,10 @@ class Run {
     const HubId hub{static_cast<std::uint16_t>(choice % 3 + 1)};
     return make_id<GroupId>(hub, choice / 3 % 2 + 1);
   }
-  JoinTerms terms() { return {choices_.below(3) * 1'000, choices_.below(2) + 1}; }
+  JoinTerms terms() {
+    return {choices_.below(3) * 1'000, static_cast<std::uint16_t>(choices_.below(2) + 1),
+            static_cast<std::uint16_t>(choices_.below(3))};
+  }
 
   void one() {
     const LinkNumber link{choices_.below(kLinks) + 1};
