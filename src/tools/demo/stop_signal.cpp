@@ -8,12 +8,12 @@
 namespace gimnet::demo {
 namespace {
 
-volatile std::sig_atomic_t received = 0;
+volatile std::sig_atomic_t signal_received = 0;
 unsigned patience = 0;
 
 // alarm() is one of the calls that POSIX allows in a signal handler.
 extern "C" void remember(int signal) {
-  received = signal;
+  signal_received = signal;
   ::alarm(patience);
 }
 
@@ -29,6 +29,6 @@ void remember_stop_signals(unsigned patience_s) {
   ::sigaction(SIGPIPE, &action, nullptr);
 }
 
-int stop_signal() { return received; }
+int stop_signal() { return signal_received; }
 
 }  // namespace gimnet::demo

@@ -36,7 +36,7 @@ struct Tally {
   std::uint64_t lost = 0;
 };
 
-std::string microseconds(double value) { return decimal(value, 1); }
+std::string one_decimal(double value) { return decimal(value, 1); }
 
 void print_json(ToolSession& session, Peer peer, const Tally& tally) {
   const RoundTrips::Summary us = tally.round_trips.summary_us();
@@ -53,10 +53,10 @@ void print_text(ToolSession& session, const Tally& tally) {
   session.output().write(std::to_string(tally.sent) + " sent, " + std::to_string(tally.lost) +
                          " lost\n");
   if (tally.round_trips.count() == 0) return;
-  session.output().write("round trip in us: min " + microseconds(us.min) + ", mean " +
-                         microseconds(us.mean) + ", p50 " + microseconds(us.p50) + ", p99 " +
-                         microseconds(us.p99) + ", p99.9 " + microseconds(us.p99_9) + ", max " +
-                         microseconds(us.max) + "\n");
+  session.output().write("round trip in us: min " + one_decimal(us.min) + ", mean " +
+                         one_decimal(us.mean) + ", p50 " + one_decimal(us.p50) + ", p99 " +
+                         one_decimal(us.p99) + ", p99.9 " + one_decimal(us.p99_9) + ", max " +
+                         one_decimal(us.max) + "\n");
 }
 
 /// Nothing: go on.
@@ -78,7 +78,7 @@ std::optional<Failure> ping_once(ToolSession& session, Peer peer, Tally& tally) 
   }
   if (options.json || session.stopped()) return std::nullopt;
   session.output().write(answer ? "answer from " + peer.text() + " in " +
-                                      microseconds(static_cast<double>(*answer) / 1000.0) + " us\n"
+                                      one_decimal(static_cast<double>(*answer) / 1000.0) + " us\n"
                                 : answer.failure().sentence + "\n");
   session.output().flush();
   return std::nullopt;

@@ -13,8 +13,6 @@ constexpr std::size_t kSendsMost = 40;
 constexpr std::size_t kSendsOfAllMost = 2'000;
 /// Names that are asked for at each hub, beside those that several nodes want.
 constexpr std::size_t kNamesMost = 12;
-/// Of one link, with its jitter.
-constexpr std::uint64_t kSlowestMs = 60;
 constexpr std::uint64_t kFrameBytesMost = 140;
 
 std::uint64_t hop_limits(const hub::ShardCounters& counters) {

@@ -7,9 +7,8 @@ namespace gimnet::sim::hubs {
 namespace {
 
 constexpr std::size_t kServicesMost = 3;
-/// A subscription is answered after 1 s at the latest; of one link, with its jitter: 60 ms.
+/// A subscription is answered after 1 s at the latest.
 constexpr std::uint64_t kAnswerMs = 1'200;
-constexpr std::uint64_t kSlowestMs = 60;
 
 struct Given {
   SimNode* node;

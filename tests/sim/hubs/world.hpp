@@ -13,6 +13,9 @@
 
 namespace gimnet::sim::hubs {
 
+/// Of one link, with its jitter.
+inline constexpr std::uint64_t kSlowestMs = 60;
+
 /// A machine that runs a hub, and what outlives the process.
 struct Machine {
   HubPlan plan;

@@ -13,7 +13,6 @@ constexpr std::uint64_t kKeepAlive = 250;
 constexpr std::uint64_t kSilence = 1'000;
 /// Of a break: how long the routes stay, so that it may be resumed.
 constexpr std::uint64_t kResume = 350;
-constexpr std::uint64_t kRetryOfCopies = 10'000;
 
 hub::LinkNumber number_of(std::size_t wire) {
   return hub::LinkNumber{static_cast<std::uint32_t>(wire + 1)};

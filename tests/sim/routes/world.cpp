@@ -11,7 +11,6 @@ constexpr milliseconds kSettled{6'000};
 constexpr milliseconds kSettledWithCopies{26'000};
 constexpr milliseconds kQuiet{2'000};
 constexpr std::uint64_t kRetryAfterVerdict = 250;
-constexpr std::uint64_t kRetryOfCopies = 10'000;
 
 proto::UniqueId unique_id(std::uint64_t number) {
   proto::UniqueId unique;

@@ -19,6 +19,9 @@
 
 namespace gimnet::sim::routes {
 
+/// In milliseconds: how long a hub waits that met a copy of itself.
+inline constexpr std::uint64_t kRetryOfCopies = 10'000;
+
 /// The checkers. Each checker has a planted bug that it must find.
 enum class Checker : std::uint8_t {
   never_back,     ///< a record is not sent back over the link that it came from
