@@ -23,7 +23,7 @@ class WaitSet(Handle):
         self._handle, self._kept = self._raw.handle, False
         self._members: Dict[int, Tuple[Waitable, Any]] = {}
         self._ahead: Dict[int, Tuple[Waitable, Any]] = {}  # of them, those that fetched ahead before they came
-        self._closing = False
+        self._over = False
         Exit.nodes.add(self)
 
     def __enter__(self) -> WaitSet:
@@ -68,8 +68,8 @@ class WaitSet(Handle):
             if left <= 0:
                 break
             self._raw.poll(left)
-        if self._closing:
-            raise errors.Closed("the wait set was closed")
+        if self._over:
+            status = _c.GIMI_CLOSED
         if status == _c.GIMI_TIMEOUT:
             raise errors.Timeout(f"nothing came within {timeout} s")
         self.check(status)
@@ -99,6 +99,6 @@ class WaitSet(Handle):
             source.shared = False
         self._members.clear()
         self._ahead.clear()
-        self._closing = True
+        self._over = True
         self._raw.wake()
         super().close()
