@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import ctypes
 import math
+import os
 import select
 import threading
 import time
@@ -144,6 +145,19 @@ class Blocking(Handle):
         self.check(status)
 
 
+class Joining:
+    """Held while a handle joins a set or leaves it, so that it is never seen in between."""
+
+    lock = threading.Lock()
+
+    @classmethod
+    def begin_anew(cls) -> None:
+        cls.lock = threading.Lock()
+
+
+os.register_at_fork(after_in_child=Joining.begin_anew)  # another thread may have held it
+
+
 class RawSet:
     """A wait set of the library and its descriptor, which are closed when nobody has it any more."""
 
@@ -188,17 +202,21 @@ class Waitable(Blocking):
         return self._handle
 
     def own_set(self) -> Optional[RawSet]:
-        """None: it is in a WaitSet, or another thread is just making its set."""
-        if self._set is None and not self.shared:
-            made = RawSet()
-            status = _c.lib.gimi_wait_set_add(made.handle, self._handle, 0)
-            if status != _c.GIMI_TAKEN:
-                self.check(status)
-                self._set = made
-        return self._set
+        """None: it, or another handle of the same queue, is in a WaitSet."""
+        own = self._set
+        if own is not None or self.shared:
+            return own
+        with Joining.lock:
+            if self._set is None and not self.shared:
+                made = RawSet()
+                status = _c.lib.gimi_wait_set_add(made.handle, self._handle, 0)
+                if status != _c.GIMI_TAKEN:
+                    self.check(status)
+                    self._set = made
+            return self._set
 
     def leave_own_set(self) -> None:
-        """For a WaitSet. Taken: the program waits by fileno()."""
+        """For a WaitSet, which holds Joining.lock. Taken: the program waits by fileno()."""
         if self.shared:
             raise errors.Taken("it is in a wait set already, or has a fileno(): wait for it in one way")
         self.shared = True

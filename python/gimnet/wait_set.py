@@ -6,7 +6,7 @@ import ctypes
 from typing import Any, Dict, List, Optional, Tuple
 
 from . import _c, errors
-from .handles import TIMEOUT_MS_MAX, Exit, Handle, RawSet, Waitable, end_of, left_ms
+from .handles import TIMEOUT_MS_MAX, Exit, Handle, Joining, RawSet, Waitable, end_of, left_ms
 
 __all__ = ["WaitSet"]
 
@@ -36,9 +36,10 @@ class WaitSet(Handle):
         """`value` is what wait() gives for it; None: itself. Taken: it is in a set; Closed."""
         if not isinstance(source, Waitable):
             raise TypeError(f"nothing is received from a {type(source).__name__}: add a subscription, a service, a watch, ...")
-        source.leave_own_set()
-        status = _c.lib.gimi_wait_set_add(self._handle, source.number, source.number)
-        source.shared = status == _c.GIMI_OK
+        with Joining.lock:
+            source.leave_own_set()
+            status = _c.lib.gimi_wait_set_add(self._handle, source.number, source.number)
+            source.shared = status == _c.GIMI_OK
         self.check(status)
         self._members[source.number] = member = (source, source if value is None else value)
         if source.has_ready():

@@ -164,14 +164,15 @@ class Waiting(unittest.TestCase):
 
     def test_a_thread_that_waits_goes_on_when_its_source_joins_a_set(self):
         publisher, subscription = self.pair("pose")
-        got = []
-        thread = threading.Thread(target=lambda: got.append(subscription.receive(PATIENCE_S).text))
-        thread.start()
-        waits = gimnet.WaitSet()
-        waits.add(subscription)
-        publisher.publish("x")
-        thread.join(PATIENCE_S)
-        self.assertEqual(got, ["x"])
+        for number in range(50):  # it joins at another moment each time
+            got = []
+            thread = threading.Thread(target=lambda got=got: got.append(subscription.receive(PATIENCE_S).text))
+            thread.start()
+            with gimnet.WaitSet() as waits:
+                waits.add(subscription)
+                publisher.publish(str(number))
+                thread.join(PATIENCE_S)
+            self.assertEqual(got, [str(number)])
 
     def test_waits_leave_no_descriptor(self):
         def descriptors():
