@@ -14,8 +14,7 @@ from typing import Any, Callable, Generic, Iterator, Optional, Tuple, Type, Type
 
 from . import _c, errors
 
-# Where there is no descriptor to wait for, the library waits in pieces of that length, and Python looks for
-# Ctrl-C between them.
+# A wait without a descriptor is cut into pieces of that length, and Python looks for Ctrl-C between them.
 PIECE_MS = 50
 TIMEOUT_MS_MAX = (1 << 31) - 1
 Got = TypeVar("Got")

@@ -54,7 +54,7 @@ class Inbox {
   /// A queue for a subscription, until remove(). `silence`: as in SubscribeOptions.
   MessageQueue& add_queue(const QueueOptions& options, Timeout silence = Timeout{0})
       GIMNET_EXCLUDES(mutex_);
-  /// What waits there counts as taken. REQUIRES: add_queue() made it, and nobody uses it any more.
+  /// Its messages count as taken. REQUIRES: add_queue() made it, and nobody uses it any more.
   void remove(MessageQueue& queue) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::size_t queues() GIMNET_EXCLUDES(mutex_);
 

@@ -86,7 +86,7 @@ class PublishedService {
   Ending end_ GIMNET_GUARDED_BY(mutex_);
 };
 
-/// What the hub is asked for of a service.
+/// The terms on which the hub is asked for a service.
 struct Share {
   std::uint32_t window = 0;  ///< 0: as the service has it
   std::uint32_t depth = 1;
@@ -109,7 +109,7 @@ struct Reader {
 
   const SubscribeOptions wish;
   MessageQueue& queue;
-  /// What the service had missed when it began; guarded by the service's mutex, as the next one.
+  /// Missed by the service when it began; guarded by the service's mutex, as the next one.
   std::uint64_t missed_before = 0;
   bool begun = false;  ///< a message came for it
 };
