@@ -6,7 +6,6 @@ import gc
 import os
 import pathlib
 import signal
-import subprocess
 import sys
 import threading
 import time
@@ -16,32 +15,10 @@ import weakref
 import gimnet
 from support.processes import Hub
 from support.waiting import PATIENCE_S, wait_until
+from two_nodes import TwoNodes, program
 
 
-def program(lines, hub, *arguments):
-    """A Python program with a node `node` named `name`."""
-    text = f"import gimnet, os, sys, threading\nnode = gimnet.connect('{arguments[0]}', hub={hub.url!r})\n{lines}"
-    return subprocess.Popen([sys.executable, "-c", text], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                            text=True)
-
-
-class Nodes(unittest.TestCase):
-    def setUp(self):
-        self.hub = Hub(self)
-        self.robot = self.node("robot")
-        self.viewer = self.node("viewer")
-
-    def node(self, name):
-        node = gimnet.connect(name, hub=self.hub.url)
-        self.addCleanup(node.close)
-        return node
-
-    def pair(self, name, **how):
-        publisher = self.robot.advertise(name, **how)
-        subscription = self.viewer.subscribe(f"robot/{name}")
-        publisher.wait_for_subscribers(1, PATIENCE_S)
-        return publisher, subscription
-
+class Nodes(TwoNodes):
     def test_publishes_dictionaries_text_and_buffers(self):
         publisher, subscription = self.pair("pose")
         large = bytearray(b"\x07" * 200_000)

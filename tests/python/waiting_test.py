@@ -10,28 +10,12 @@ import threading
 import unittest
 
 import gimnet
-from node_test import program
 from support.processes import Hub
 from support.waiting import PATIENCE_S
+from two_nodes import TwoNodes, program
 
 
-class Waiting(unittest.TestCase):
-    def setUp(self):
-        self.hub = Hub(self)
-        self.robot = self.node("robot")
-        self.viewer = self.node("viewer")
-
-    def node(self, name):
-        node = gimnet.connect(name, hub=self.hub.url)
-        self.addCleanup(node.close)
-        return node
-
-    def pair(self, name, **how):
-        publisher = self.robot.advertise(name, **how)
-        subscription = self.viewer.subscribe(f"robot/{name}")
-        publisher.wait_for_subscribers(1, PATIENCE_S)
-        return publisher, subscription
-
+class Waiting(TwoNodes):
     def assert_readable(self, source, expected=True, patience=0.0):
         self.assertEqual(select.select([source], [], [], patience)[0], [source] if expected else [])
 
