@@ -36,6 +36,7 @@ class Requests(unittest.TestCase):
             file.flush()
             self.assertEqual(self.request("--file", file.name, "--raw", "--timeout", "20").out, b"x" * 100_000 + b"\n")
         self.assertEqual(answer.wait(), 0, answer.err)
+        self.assertIn("answering B/mirror (", answer.err)
 
     def test_nobody_answers_there(self):
         self.answer()

@@ -58,6 +58,7 @@ ExitCode run_answer(ToolSession& session) {
   if (const auto ending = session.join({.name = target.substr(0, slash)})) return *ending;
   const auto answers = session.node().answer(target.substr(slash + 1));
   if (!answers) return session.fail(answers.failure());
+  say("answering " + target + " (" + session.node().peer().text() + ")");
   const auto ended = echo_requests(session, *answers);
   return ended ? session.finish() : session.fail(ended.failure());
 }
