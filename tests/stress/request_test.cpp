@@ -56,7 +56,7 @@ std::chrono::milliseconds grace() { return std::chrono::milliseconds(is_full_siz
 Node join_in_the_end(const NodeOptions& options) {
   for (;;) {
     if (auto node = Node::join(options)) return std::move(*node);
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    wait_readable({}, 20);
   }
 }
 

@@ -60,8 +60,7 @@ class StreamTableTest : public Conversation {
     options.at_full = at_full;
     options.key = {9, 9};  // the service's own counts
     std::optional<Sender> made;
-    std::thread asking(
-        [&] { made.emplace(node_->sender(kService, options).or_throw()); });
+    std::thread asking([&] { made.emplace(node_->sender(kService, options).or_throw()); });
     serve();
     asking.join();
     return *made;
