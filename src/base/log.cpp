@@ -20,15 +20,15 @@ constexpr std::int64_t kSecond = 1'000'000'000;
 
 constinit std::atomic<LogLevel> level_now{LogLevel::info};
 
-struct Writer {
+struct LogWriter {
   std::mutex mutex;
   LogRates rates;
   LogBudget budget;
   LogThrottle throttle;
 };
 
-Writer& writer() {
-  static Writer instance;
+LogWriter& writer() {
+  static LogWriter instance;
   return instance;
 }
 
@@ -57,7 +57,7 @@ bool stderr_takes_a_line() {
 }
 
 /// `alike`: lines of the same kind about the same peer that were left out before this one.
-void write_line(Writer& out, LogLevel level, std::string_view text, std::uint64_t alike,
+void write_line(LogWriter& out, LogLevel level, std::string_view text, std::uint64_t alike,
                 std::chrono::milliseconds now) {
   out.budget.add_left_out(out.throttle.take_forgotten());
   if (!out.budget.take(out.rates.all_per_s, now)) return out.budget.add_left_out(alike);
@@ -91,21 +91,21 @@ bool log_enabled(LogLevel level) {
 }
 
 void set_log_rates(const LogRates& rates) {
-  Writer& out = writer();
+  LogWriter& out = writer();
   const std::lock_guard lock(out.mutex);
   out.rates = rates;
 }
 
 void log_line(LogLevel level, std::string_view text) {
   if (!log_enabled(level)) return;
-  Writer& out = writer();
+  LogWriter& out = writer();
   const std::lock_guard lock(out.mutex);
   write_line(out, level, text, 0, now_ms());
 }
 
 void log_line(LogLevel level, const LogSubject& subject, std::string_view text) {
   if (!log_enabled(level)) return;
-  Writer& out = writer();
+  LogWriter& out = writer();
   const std::lock_guard lock(out.mutex);
   const std::chrono::milliseconds now = now_ms();
   const LogThrottle::Verdict verdict =

@@ -82,8 +82,8 @@ class Shards final : public ShardProxy {
 };
 
 /// The parts that the shards share, and their owner.
-struct Ground {
-  explicit Ground(const HubOptions& options)
+struct SharedParts {
+  explicit SharedParts(const HubOptions& options)
       : quiescence(options.shards),
         budget(options.limits.budget_bytes, options.shards),
         retained_budget(options.limits.retained_budget_bytes),
@@ -213,7 +213,7 @@ struct Hub::Parts {
   Reloader reloader;
   Limits limits;  ///< the conductor's; each shard has its own
   const std::unique_ptr<StateFolder> state_folder;
-  Ground ground;
+  SharedParts ground;
   const HubShared shared;
   Shards shards;
   LinkDialler dialler;

@@ -24,19 +24,19 @@ using StreamPointer = std::unique_ptr<Stream>;
 bool is_unix(const Address& address) { return address.scheme == Address::Scheme::unix_socket; }
 
 /// A place to connect to, and what there should be.
-struct Place {
+struct DialTarget {
   const Address& address;
   const char* what;
 };
 
-NetError cannot_connect(const Place& place, int error) {
-  const Address& address = place.address;
+NetError cannot_connect(const DialTarget& target, int error) {
+  const Address& address = target.address;
   Fault fault = Fault::no_peer;
   if (error == EMFILE || error == ENFILE || error == ENOMEM || error == ENOBUFS)
     fault = Fault::no_memory;
   if (error == EACCES || error == EPERM) fault = Fault::not_permitted;
   std::string remedy =
-      fault == Fault::no_peer ? "; is the " + std::string(place.what) + " running there?" : "";
+      fault == Fault::no_peer ? "; is the " + std::string(target.what) + " running there?" : "";
   if (error == EACCES && is_unix(address)) {
     remedy = "; it is another user's: connect as the user that runs the hub, or over TCP";
   }
@@ -62,36 +62,36 @@ NetError closed_early(const Address& address) {
 }
 
 /// Waits for a connect() under way.
-Result<StreamPointer, NetError> finish_dial(StreamPointer stream, const Place& place,
+Result<StreamPointer, NetError> finish_dial(StreamPointer stream, const DialTarget& target,
                                             Deadline deadline, const WakeSignal& cancel) {
   for (;;) {
     const Readiness ready = wait_for(stream.get(), {.write = true}, cancel, deadline);
-    if (ready.woken) return cancelled(place.address);
+    if (ready.woken) return cancelled(target.address);
     if (ready.writable) break;
     if (steady_now_ns() >= deadline) {
       return NetError{Fault::timeout,
-                      "no connection to " + place.address.url() + " within the time given"};
+                      "no connection to " + target.address.url() + " within the time given"};
     }
   }
   int error = 0;
   socklen_t size = sizeof error;
   if (::getsockopt(stream->descriptor(), SOL_SOCKET, SO_ERROR, &error, &size) != 0) error = errno;
-  if (error != 0) return cannot_connect(place, error);
+  if (error != 0) return cannot_connect(target, error);
   return stream;
 }
 
-Result<StreamPointer, NetError> dial_one(const sockaddr* to, socklen_t size, const Place& place,
-                                         const SocketOptions& options, Deadline deadline,
-                                         const WakeSignal& cancel) {
+Result<StreamPointer, NetError> dial_one(const sockaddr* to, socklen_t size,
+                                         const DialTarget& target, const SocketOptions& options,
+                                         Deadline deadline, const WakeSignal& cancel) {
   const int descriptor = ::socket(to->sa_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  if (descriptor < 0) return cannot_connect(place, errno);
+  if (descriptor < 0) return cannot_connect(target, errno);
   StreamPointer stream = make_stream(
       descriptor,
-      is_unix(place.address) ? SocketStream::Family::unix_socket : SocketStream::Family::tcp,
+      is_unix(target.address) ? SocketStream::Family::unix_socket : SocketStream::Family::tcp,
       options);
   if (::connect(descriptor, to, size) == 0) return stream;
-  if (errno != EINPROGRESS && errno != EINTR) return cannot_connect(place, errno);
-  return finish_dial(std::move(stream), place, deadline, cancel);
+  if (errno != EINPROGRESS && errno != EINTR) return cannot_connect(target, errno);
+  return finish_dial(std::move(stream), target, deadline, cancel);
 }
 
 /// Nothing: all is written.
@@ -174,14 +174,14 @@ std::optional<NetError> await_welcome(Stream& stream, DialHandshake& handshake,
   return std::nullopt;
 }
 
-Result<StreamPointer, NetError> dial_place(const Place& place, const SocketOptions& options,
-                                           Deadline deadline, const WakeSignal& cancel) {
-  const auto found = find_addresses(place.address, deadline, cancel);
+Result<StreamPointer, NetError> dial_target(const DialTarget& target, const SocketOptions& options,
+                                            Deadline deadline, const WakeSignal& cancel) {
+  const auto found = find_addresses(target.address, deadline, cancel);
   if (!found) return found.error();
   std::optional<NetError> last;
   for (const HostAddress& each : *found) {
     auto dialed = dial_one(reinterpret_cast<const sockaddr*>(each.data()),
-                           static_cast<socklen_t>(each.size()), place, options, deadline, cancel);
+                           static_cast<socklen_t>(each.size()), target, options, deadline, cancel);
     if (dialed || dialed.error().fault == Fault::cancelled) return dialed;
     last = dialed.error();
   }
@@ -201,7 +201,7 @@ Result<StreamPointer, NetError> dial_through(const ProxyAddress& proxy, const Ad
       error.sentence = "through the proxy " + proxy.shown() + ": " + error.sentence;
     return error;
   };
-  auto dialed = dial_place({door, "proxy"}, options, deadline, cancel);
+  auto dialed = dial_target({door, "proxy"}, options, deadline, cancel);
   if (!dialed) return of_proxy(dialed.error());
   ProxyHandshake handshake(proxy, to);
   const std::string request = handshake.request();
@@ -226,7 +226,7 @@ Result<StreamPointer, NetError> dial_through(const ProxyAddress& proxy, const Ad
 
 Result<StreamPointer, NetError> dial(const Address& address, const SocketOptions& options,
                                      Deadline deadline, const WakeSignal& cancel) {
-  return dial_place({address, "hub"}, options, deadline, cancel);
+  return dial_target({address, "hub"}, options, deadline, cancel);
 }
 
 Result<Welcomed, NetError> dial_hub(const Address& address, const DialOptions& options,

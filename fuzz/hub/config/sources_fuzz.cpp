@@ -58,7 +58,7 @@ struct Position {
 };
 
 /// Of "PATH:LINE:COLUMN".
-Position position_of(const Fault& fault, const std::string& path) {
+Position position_of(const ConfigFault& fault, const std::string& path) {
   FUZZ_MUST(fault.place.starts_with(path + ":"));
   char* end = nullptr;
   Position position;
@@ -75,7 +75,7 @@ std::size_t line_count(std::string_view text) {
 
 void check_faults(const Faults& faults, std::string_view text, const std::string& path) {
   std::set<std::string> seen;
-  for (const Fault& fault : faults) {
+  for (const ConfigFault& fault : faults) {
     const Position position = position_of(fault, path);
     // One line and one column behind the end: what is missing there.
     FUZZ_MUST(position.line >= 1 && position.line <= line_count(text) + 1);
@@ -119,7 +119,7 @@ void check_printed(const Configuration& configuration, const File& file) {
 }
 
 /// Was the file read, and is the fault about what it says?
-bool is_about_a_value(const Fault& fault) {
+bool is_about_a_value(const ConfigFault& fault) {
   for (const std::string_view unread : {"this is not ", "is given twice", "is not UTF-8",
                                         "does not fit in 64 bits", "no key has so many parts"}) {
     if (fault.sentence.find(unread) != std::string::npos) return false;
@@ -136,13 +136,13 @@ void check_one_fault_more(const Faults& faults, std::string_view text, const Fil
   if (text.size() + kWrong.size() > kConfigBytesMax) return;
   const ReadConfiguration more = file.read(std::string{kWrong} + std::string{text});
   std::multiset<std::pair<std::size_t, std::size_t>> due;
-  for (const Fault& fault : faults) {
+  for (const ConfigFault& fault : faults) {
     const Position position = position_of(fault, file.path());
     due.emplace(position.line + 1, position.column);
   }
   due.emplace(1, 1);
   std::multiset<std::pair<std::size_t, std::size_t>> found;
-  for (const Fault& fault : more.faults) {
+  for (const ConfigFault& fault : more.faults) {
     const Position position = position_of(fault, file.path());
     found.emplace(position.line, position.column);
   }

@@ -14,14 +14,14 @@ namespace {
 constexpr std::uint64_t kOpen = 0x8000'0000u;
 constexpr std::uint64_t kUsersMask = 0x7FFF'FFFFu;
 
-struct Slot {
+struct HandleSlot {
   std::atomic<std::uint64_t> state{0};
   std::atomic<Node*> node{
       nullptr};  ///< set by who claims the slot, before `open` is set; null: free
   std::uint32_t fork_generation = 0;  ///< written by the same, between the two
 };
 
-constinit std::array<Slot, kHandlesMax> g_slots{};
+constinit std::array<HandleSlot, kHandlesMax> g_slots{};
 constinit std::atomic<std::uint32_t> g_search_from{0};
 
 // A handle, as the pointer that it looks like: generation, slot (12 bits), and 8 in the lowest 4
@@ -80,7 +80,7 @@ NodeRef find_node(const nif_node* handle) {
     ref.status_ = no_handle();
     return ref;
   }
-  Slot& slot = g_slots[ref.slot_];
+  HandleSlot& slot = g_slots[ref.slot_];
   std::uint64_t state = slot.state.load();
   do {
     if ((state & kOpen) == 0 || generation_of(state) != generation) {
@@ -103,7 +103,7 @@ nif_node* add_node(std::unique_ptr<Node>& node) {
   for (std::uint32_t i = 0; i < kHandlesMax; ++i) {
     // Slots rest as long as there are others, so that generations last.
     const std::uint32_t index = g_search_from.fetch_add(1) % kHandlesMax;
-    Slot& slot = g_slots[index];
+    HandleSlot& slot = g_slots[index];
     Node* claimed = nullptr;
     if (!slot.node.compare_exchange_strong(claimed, node.get())) continue;
     [[maybe_unused]] const Node* const owned = node.release();  // by the slot from now on
@@ -133,7 +133,7 @@ nif_status close_node(nif_node* handle) {
   }
   std::uintptr_t generation = 0;
   static_cast<void>(take_apart(handle, index, generation));
-  Slot& slot = g_slots[index];
+  HandleSlot& slot = g_slots[index];
   std::uint64_t state = slot.state.load();
   do {
     if ((state & kOpen) == 0 || generation_of(state) != generation) return no_handle();

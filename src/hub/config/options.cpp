@@ -210,7 +210,7 @@ std::variant<CommandLine, CommandLineEnding> read_all(const CLI::App& app, Comma
   ReadConfiguration read = read_configuration(line.sources, true);
   if (!read.faults.empty()) {
     CommandLineEnding ending{2, {}};
-    for (const Fault& fault : read.faults) ending.text += fault.line() + "\n";
+    for (const ConfigFault& fault : read.faults) ending.text += fault.line() + "\n";
     return ending;
   }
   // Read again it is the same file, or an error: a hub does not lose its configuration because a

@@ -11,7 +11,7 @@ Reloading Reloader::read_again() {
   Reloading reloading;
   const ReadConfiguration read = read_configuration(sources_);
   const std::size_t told = std::min(read.faults.size(), kReloadFaultsMax);
-  for (const Fault& fault : std::span(read.faults).first(told))
+  for (const ConfigFault& fault : std::span(read.faults).first(told))
     reloading.faults.push_back(fault.line());
   reloading.more_faults = told < read.faults.size();
   if (!reloading.faults.empty()) return reloading;

@@ -272,7 +272,7 @@ void complete(Configuration& configuration, Faults& faults) {
   const HubOptions& options = configuration.options;
   for (std::size_t i = 0; i < options.listen.size(); ++i) {
     if (options.listen[i].is_local() || options.insecure) continue;
-    const Fault& where = configuration.listen_places[i];
+    const ConfigFault& where = configuration.listen_places[i];
     const std::string word = where.place.empty() ? "--insecure" : "insecure = true";
     faults.push_back(
         {where.place,

@@ -52,7 +52,7 @@ struct Configuration {
   /// By key ("shards", "limits.nodes"); what is not in it is the default.
   std::map<std::string, std::string, std::less<>> origins;
   /// One for each of options.listen, for what can only be judged when all is known.
-  std::vector<Fault> listen_places;
+  std::vector<ConfigFault> listen_places;
   std::vector<std::string> link_places;  ///< the same of options.links.dial
   std::string proxy{};                   ///< GIMNET_PROXY, for links that name none
   std::map<std::string, std::string, std::less<>> places;  ///< as `origins`, for faults

@@ -34,8 +34,8 @@ constexpr std::array<std::string_view, 2> kTables{"limits", "links"};
 /// within the other.
 constexpr std::size_t kKeyDotsMax = 64;
 
-/// Names places of a file.
-struct Places {
+/// Names the positions of a file.
+struct FilePositions {
   const std::string& name;
 
   [[nodiscard]] std::string of(std::size_t line, std::size_t column) const {
@@ -53,13 +53,13 @@ std::string_view quoted_part(std::string_view text) {
   return first >= last ? std::string_view{} : text.substr(first + 1, last - first - 1);
 }
 
-Fault fault_of(const toml::parse_error& error, const Places& places) {
+ConfigFault fault_of(const toml::parse_error& error, const FilePositions& positions) {
   std::string_view what = error.description();
   if (const std::size_t colon = what.find(": ");
       what.starts_with("Error while") && colon != std::string_view::npos) {
     what.remove_prefix(colon + 2);
   }
-  const std::string place = places.of(error.source());
+  const std::string place = positions.of(error.source());
   if (what.starts_with("cannot redefine")) {
     return {place, "'" + escaped(quoted_part(what), kQuotedLineMax) +
                        "' is given twice; leave one of them out"};
@@ -81,17 +81,18 @@ std::size_t key_dots(std::string_view line) {
 }
 
 /// The first line that the library is not to see: it recurses for each part of a key.
-std::optional<Fault> fault_of_lines(std::string_view text, const Places& places) {
+std::optional<ConfigFault> fault_of_lines(std::string_view text, const FilePositions& positions) {
   for (std::size_t number = 1; !text.empty(); ++number) {
     const std::string_view line = text.substr(0, text.find('\n'));
     const auto* bytes = reinterpret_cast<const unsigned char*>(line.data());
     if (!proto::bitestream::valid_utf8(bytes, line.size())) {
-      return Fault{places.of(number, 1),
-                   "a byte of this line is not UTF-8 text; save the file in that encoding"};
+      return ConfigFault{positions.of(number, 1),
+                         "a byte of this line is not UTF-8 text; save the file in that encoding"};
     }
     if (key_dots(line) > kKeyDotsMax) {
-      return Fault{places.of(number, 1),
-                   "no key has so many parts; write KEY = VALUE, or LIMIT = VALUE below [limits]"};
+      return ConfigFault{
+          positions.of(number, 1),
+          "no key has so many parts; write KEY = VALUE, or LIMIT = VALUE below [limits]"};
     }
     text.remove_prefix(std::min(line.size() + 1, text.size()));
   }
@@ -125,18 +126,19 @@ ConfigValue::Kind kind_of(const toml::node& node) {
 /// in them.
 constexpr int kDepthMax = 3;
 
-ConfigValue value_of(const toml::node& node, const Places& places, int depth = 0) {
+ConfigValue value_of(const toml::node& node, const FilePositions& positions, int depth = 0) {
   ConfigValue value;
   value.kind = kind_of(node);
   value.text = text_of(node);
-  value.place = places.of(node.source());
+  value.place = positions.of(node.source());
   if (depth == kDepthMax) return value;
   if (const toml::array* list = node.as_array()) {
-    for (const toml::node& item : *list) value.items.push_back(value_of(item, places, depth + 1));
+    for (const toml::node& item : *list)
+      value.items.push_back(value_of(item, positions, depth + 1));
   }
   if (const toml::table* table = node.as_table(); table != nullptr && depth > 0) {
     for (auto&& [key, item] : *table) {
-      value.items.push_back(value_of(item, places, depth + 1));
+      value.items.push_back(value_of(item, positions, depth + 1));
       value.items.back().key = key.str();
     }
   }
@@ -144,17 +146,17 @@ ConfigValue value_of(const toml::node& node, const Places& places, int depth = 0
 }
 
 Given given_of(const std::string& name, const toml::key& written, const toml::node& node,
-               const Places& places) {
-  return {name, value_of(node, places), places.of(written.source()), name,
-          places.name + ":" + std::to_string(written.source().begin.line)};
+               const FilePositions& positions) {
+  return {name, value_of(node, positions), positions.of(written.source()), name,
+          positions.name + ":" + std::to_string(written.source().begin.line)};
 }
 
-std::vector<Given> keys_of(const toml::table& table, const Places& places) {
+std::vector<Given> keys_of(const toml::table& table, const FilePositions& positions) {
   using Position = std::pair<std::size_t, std::size_t>;
   std::vector<std::pair<Position, Given>> found;
   const auto add = [&](const std::string& name, const toml::key& key, const toml::node& node) {
     const auto& begin = key.source().begin;
-    found.emplace_back(Position{begin.line, begin.column}, given_of(name, key, node, places));
+    found.emplace_back(Position{begin.line, begin.column}, given_of(name, key, node, positions));
   };
   for (auto&& [key, node] : table) {
     const std::string name{key.str()};
@@ -177,23 +179,24 @@ std::vector<Given> keys_of(const toml::table& table, const Places& places) {
 }  // namespace
 
 TomlFile read_toml(std::string_view text, const std::string& name) {
-  const Places places{name};
+  const FilePositions positions{name};
   TomlFile file;
   if (text.size() > kConfigBytesMax) {
-    file.faults.push_back({places.of(1, 1), "the file is over " + std::to_string(kConfigBytesMax) +
-                                                " bytes; is it a configuration of tcphub?"});
+    file.faults.push_back({positions.of(1, 1), "the file is over " +
+                                                   std::to_string(kConfigBytesMax) +
+                                                   " bytes; is it a configuration of tcphub?"});
     return file;
   }
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);  // a mark of the encoding
-  if (const std::optional<Fault> fault = fault_of_lines(text, places)) {
+  if (const std::optional<ConfigFault> fault = fault_of_lines(text, positions)) {
     file.faults.push_back(*fault);
     return file;
   }
   const toml::parse_result parsed = toml::parse(text);
   if (parsed) {
-    file.keys = keys_of(parsed.table(), places);
+    file.keys = keys_of(parsed.table(), positions);
   } else {
-    file.faults.push_back(fault_of(parsed.error(), places));
+    file.faults.push_back(fault_of(parsed.error(), positions));
   }
   return file;
 }

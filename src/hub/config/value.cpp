@@ -20,7 +20,7 @@ std::string own_name(const std::string& label) {
 
 }  // namespace
 
-Fault value_fault(const Given& given, std::string sentence) {
+ConfigFault value_fault(const Given& given, std::string sentence) {
   return {given.value.place, std::move(sentence)};
 }
 

@@ -33,7 +33,7 @@ struct Given {
 };
 
 /// Something that is wrong with a configuration.
-struct Fault {
+struct ConfigFault {
   std::string place;     ///< "FILE:LINE:COLUMN", or ""
   std::string sentence;  ///< what is wrong, and what to do
 
@@ -41,16 +41,16 @@ struct Fault {
   [[nodiscard]] std::string line() const { return (place.empty() ? "tcphub: " : "") + text(); }
   /// The same without the program's name.
   [[nodiscard]] std::string text() const { return (place.empty() ? "" : place + ": ") + sentence; }
-  friend bool operator==(const Fault&, const Fault&) = default;
+  friend bool operator==(const ConfigFault&, const ConfigFault&) = default;
 };
 
-using Faults = std::vector<Fault>;
+using Faults = std::vector<ConfigFault>;
 
 // Reading a value. What is wrong with it is a fault, with what to write instead. Thread safety:
 // pure functions.
 
 /// Something that is wrong with the value.
-[[nodiscard]] Fault value_fault(const Given& given, std::string sentence);
+[[nodiscard]] ConfigFault value_fault(const Given& given, std::string sentence);
 
 /// A kind for people: "a whole number".
 [[nodiscard]] std::string_view kind_name(ConfigValue::Kind kind);

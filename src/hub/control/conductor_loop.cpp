@@ -30,12 +30,12 @@ constexpr milliseconds kDrainMargin{1'000};
 milliseconds now() { return milliseconds{steady_now_ns() / 1'000'000}; }
 
 /// Waits for a descriptor that somebody else owns.
-class Watch {
+class DescriptorWatch {
  public:
-  Watch(asio::io_context& context, int descriptor) : descriptor_(context, descriptor) {}
-  ~Watch() { descriptor_.release(); }
-  Watch(const Watch&) = delete;
-  Watch& operator=(const Watch&) = delete;
+  DescriptorWatch(asio::io_context& context, int descriptor) : descriptor_(context, descriptor) {}
+  ~DescriptorWatch() { descriptor_.release(); }
+  DescriptorWatch(const DescriptorWatch&) = delete;
+  DescriptorWatch& operator=(const DescriptorWatch&) = delete;
 
   template <class Then>
   void wait(Then then) {
@@ -60,7 +60,7 @@ struct ConductorLoop::Impl {
           watch(context, acceptor.listener().descriptor()),
           pause(context) {}
     Acceptor acceptor;
-    Watch watch;
+    DescriptorWatch watch;
     asio::steady_timer pause;
   };
 
@@ -302,9 +302,9 @@ struct ConductorLoop::Impl {
   DescriptorReserve reserve;
   WaitingRoom strangers;
   std::vector<std::unique_ptr<net::Stream>> leaving;  ///< to be seen off by `strangers`
-  Watch strangers_watch;
-  Watch inbox_watch;
-  Watch dialler_watch;
+  DescriptorWatch strangers_watch;
+  DescriptorWatch inbox_watch;
+  DescriptorWatch dialler_watch;
   asio::steady_timer timer;
   std::optional<milliseconds> armed;  ///< when the timer fires, or is seen to have been late
   std::optional<asio::steady_timer> drain_deadline;

@@ -1,32 +1,11 @@
 #include "hub/control/link_dialler.hpp"
 
-#include <pthread.h>
-
-#include <csignal>
 #include <system_error>
 
 #include "base/clock.hpp"
+#include "base/signals_blocked.hpp"
 
 namespace gimnet::hub {
-namespace {
-
-/// The conductor alone takes signals.
-class SignalsBlocked {
- public:
-  SignalsBlocked() {
-    sigset_t all;
-    ::sigfillset(&all);
-    ::pthread_sigmask(SIG_SETMASK, &all, &before_);
-  }
-  ~SignalsBlocked() { ::pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
-  SignalsBlocked(const SignalsBlocked&) = delete;
-  SignalsBlocked& operator=(const SignalsBlocked&) = delete;
-
- private:
-  sigset_t before_{};
-};
-
-}  // namespace
 
 LinkDialler::~LinkDialler() {
   cancel_.raise();
@@ -45,7 +24,7 @@ void LinkDialler::dial(LinkNumber link, const DialledLink& to, const proto::Hell
   Attempt& attempt = attempts_.emplace_back();
   attempt.link = link;
   try {
-    const SignalsBlocked blocked;
+    const SignalsBlocked blocked;  // The conductor alone takes signals.
     attempt.thread = std::thread([this, &attempt, address = to.address, hello, how] {
       note(attempt, net::dial_hub(address, how, hello, steady_now_ns() + kAttemptNs, cancel_));
     });

@@ -55,7 +55,7 @@ void store_operation(std::byte* bytes, Operation operation, std::size_t size) {
   bytes[0] = static_cast<std::byte>(operation);
 }
 
-struct Encoder {
+struct PayloadEncoder {
   std::byte* bytes;
 
   std::size_t operator()(const Ping& ping) const {
@@ -143,7 +143,7 @@ std::optional<Message> decode(std::span<const std::byte> payload) {
 }
 
 std::size_t encode(const Message& message, std::span<std::byte, kSizeMax> payload) {
-  return std::visit(Encoder{payload.data()}, message);
+  return std::visit(PayloadEncoder{payload.data()}, message);
 }
 
 std::size_t encode_frame(const Message& message, NodeId src,

@@ -41,9 +41,9 @@ constexpr Range kStamp{0.0, 1e11};
 
 // Reads the words of a line, blanks between them as fscanf takes them, and named numbers from them.
 // Keeps the first complaint; after it, everything answers 0.
-class Fields {
+class WordScanner {
  public:
-  explicit Fields(std::string_view line) : rest_(line) { message_ = next_word(); }
+  explicit WordScanner(std::string_view line) : rest_(line) { message_ = next_word(); }
 
   /// The first word; empty: there is none.
   [[nodiscard]] std::string_view message() const { return message_; }
@@ -104,7 +104,7 @@ class Fields {
 };
 
 // x y theta tv rv accel stamp host logger_stamp
-void read_odometry(Fields& fields, LogRecord& record) {
+void read_odometry(WordScanner& fields, LogRecord& record) {
   record.pose = fields.pose("");
   (void)fields.number("tv", kSpeed);
   (void)fields.number("rv", kSpeed);
@@ -116,7 +116,7 @@ void read_odometry(Fields& fields, LogRecord& record) {
 }
 
 // count ranges... x y theta odom_x odom_y odom_theta stamp host logger_stamp
-void read_scan(Fields& fields, LogRecord& record) {
+void read_scan(WordScanner& fields, LogRecord& record) {
   const double beams = fields.number("number of beams", {1.0, static_cast<double>(kLogBeamsMax)});
   if (beams != std::floor(beams))
     fields.complain(fmt::format("FLASER: {} is no number of beams", beams));
@@ -143,7 +143,7 @@ bool is_message_name(std::string_view word) {
 }  // namespace
 
 Result<LineKind> parse_carmen_line(std::string_view line, LogRecord& record) {
-  Fields fields(line);
+  WordScanner fields(line);
   const std::string_view name = fields.message();
   record = LogRecord{};
   if (name == "ODOM") {

@@ -48,16 +48,16 @@ struct LabHub {
 };
 
 /// Programs are started and find their files here.
-struct Places {
+struct LabPaths {
   const std::string& programs;
   const TemporaryFolder& folder;
 };
 
-Result<LabHub> start_lab_hub(const Places& places, const std::string& name, int id,
+Result<LabHub> start_lab_hub(const LabPaths& paths, const std::string& name, int id,
                              const std::vector<std::string>& more) {
   HubWish wish{"the hub " + name, name, {"--hub-name", name, "--hub-id", std::to_string(id)}};
   wish.more.insert(wish.more.end(), more.begin(), more.end());
-  Result<HubProcess> hub = start_hub(places.programs, places.folder, wish);
+  Result<HubProcess> hub = start_hub(paths.programs, paths.folder, wish);
   if (!hub) return hub.error();
   NodeOptions joining;
   joining.hub = hub->at.unix_socket;
@@ -66,12 +66,12 @@ Result<LabHub> start_lab_hub(const Places& places, const std::string& name, int 
   return LabHub{name, std::move(hub->process), hub->at, std::move(*node)};
 }
 
-Result<ChildProcess> start_machine(const Places& places, const std::string& name,
+Result<ChildProcess> start_machine(const LabPaths& paths, const std::string& name,
                                    const LabHub& hub) {
   Result<ChildProcess> process = ChildProcess::start(
       {"the " + name,
-       {places.programs + "/gimnet-demo", "robot", "--hub", hub.at.unix_socket, "--robot", name},
-       places.folder / (name + ".log")});
+       {paths.programs + "/gimnet-demo", "robot", "--hub", hub.at.unix_socket, "--robot", name},
+       paths.folder / (name + ".log")});
   if (!process) return process.error();
   if (const Result<std::string> ready = process->read_line(kReady_ns); !ready) return ready.error();
   return process;
@@ -169,8 +169,8 @@ struct Wish {
   LabHub& from;
 };
 
-Result<Driven> start_driven(const Places& places, const Wish& wish) {
-  Result<ChildProcess> process = start_machine(places, wish.name, wish.at);
+Result<Driven> start_driven(const LabPaths& paths, const Wish& wish) {
+  Result<ChildProcess> process = start_machine(paths, wish.name, wish.at);
   if (!process) return process.error();
   const std::string all = std::string(wish.name) + "/*";
   const auto known = [&] {
@@ -213,7 +213,7 @@ class Labs {
   [[nodiscard]] LabsRecord record();
 
  private:
-  std::optional<Error> start_hubs(const Places& places);
+  std::optional<Error> start_hubs(const LabPaths& paths);
   /// Cuts the WAN when that is due; the error of a hub that ended.
   std::optional<Error> watch_over();
   void make_viewer(Driven& driven, bool first);
@@ -229,9 +229,9 @@ class Labs {
   std::uint64_t cuts_ = 0;
 };
 
-std::optional<Error> Labs::start_hubs(const Places& places) {
+std::optional<Error> Labs::start_hubs(const LabPaths& paths) {
   hubs_.reserve(3);
-  Result<LabHub> north = start_lab_hub(places, "north", 1, {"--accept-links"});
+  Result<LabHub> north = start_lab_hub(paths, "north", 1, {"--accept-links"});
   if (!north) return north.error();
   impair::Impairment how;
   how.delay_ns = kWanDelay_ns;
@@ -243,7 +243,7 @@ std::optional<Error> Labs::start_hubs(const Places& places) {
   hubs_.push_back(std::move(*north));
   for (const auto& [name, link] : {std::pair{"south", wan_->url()}, {"rover", near}}) {
     const int id = static_cast<int>(hubs_.size()) + 1;
-    Result<LabHub> hub = start_lab_hub(places, name, id, {"--link", link});
+    Result<LabHub> hub = start_lab_hub(paths, name, id, {"--link", link});
     if (!hub) return hub.error();
     hubs_.push_back(std::move(*hub));
   }
@@ -254,14 +254,14 @@ std::optional<Error> Labs::start() {
   Result<TemporaryFolder> folder = TemporaryFolder::make();
   if (!folder) return folder.error();
   folder_.emplace(std::move(*folder));
-  const Places places{options_.programs, *folder_};
-  if (std::optional<Error> error = start_hubs(places)) return error;
+  const LabPaths paths{options_.programs, *folder_};
+  if (std::optional<Error> error = start_hubs(paths)) return error;
   LabHub& north = hubs_[0];
   LabHub& south = hubs_[1];
   for (const Wish& wish : {Wish{"rover-1", "driven on site", hubs_[2], north},
                            Wish{"crawler-1", "driven over the WAN", north, south},
                            Wish{"simulator", "simulated, same services", south, north}}) {
-    Result<Driven> started = start_driven(places, wish);
+    Result<Driven> started = start_driven(paths, wish);
     if (!started) return started.error();
     driven_.push_back(std::move(*started));
   }

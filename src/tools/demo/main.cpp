@@ -20,9 +20,12 @@
 #include "tools/demo/simulated_robot.hpp"
 #include "tools/demo/stop_signal.hpp"
 #include "tools/demo/viewer.hpp"
+#include "tools/gimnet/exit_code.hpp"
 
 namespace gimnet::demo {
 namespace {
+
+using tool::ExitCode;
 
 constexpr Extent kPicture{80, 24};
 /// Without a terminal there is nobody to end the laboratories.
@@ -107,12 +110,12 @@ ExitCode run_robot(const DemoOptions& options) {
   Result<Robot::SourceMaker> maker = source_maker(options);
   if (!maker) {
     complain(maker.error());
-    return ExitCode::kUsage;
+    return ExitCode::usage;
   }
   Result<std::unique_ptr<NodePort>> port = connect_robot({options.hub_url, options.robot});
   if (!port) {
     complain(port.error());
-    return ExitCode::kNoNetwork;
+    return ExitCode::no_connection;
   }
   // The robot runs whether the line could be written or not.
   (void)show("ready\n");
@@ -120,10 +123,10 @@ ExitCode run_robot(const DemoOptions& options) {
   while (stop_signal() == 0) {
     if (const std::optional<Error> error = robot.step()) {
       complain(*error);
-      return ExitCode::kLost;
+      return ExitCode::failed;
     }
   }
-  return ExitCode::kGood;
+  return ExitCode::done;
 }
 
 // Runs the viewer's process, with an own hub and robot unless the role is kView; prints the summary
@@ -131,7 +134,7 @@ ExitCode run_robot(const DemoOptions& options) {
 ExitCode run_viewer(const DemoOptions& options) {
   if (const std::optional<Error> error = unusable_input(options)) {
     complain(*error);
-    return ExitCode::kUsage;
+    return ExitCode::usage;
   }
   std::optional<OwnNetwork> network;
   ViewerOptions viewing;
@@ -141,7 +144,7 @@ ExitCode run_viewer(const DemoOptions& options) {
     Result<OwnNetwork> started = OwnNetwork::start(options, folder_of_this_program());
     if (!started) {
       complain(started.error());
-      return ExitCode::kNoNetwork;
+      return ExitCode::no_connection;
     }
     network.emplace(std::move(*started));
     viewing.hub_url = network->hub_url();
@@ -150,7 +153,7 @@ ExitCode run_viewer(const DemoOptions& options) {
   Result<std::unique_ptr<NodePort>> port = connect_viewer({viewing.hub_url, options.robot});
   if (!port) {
     complain(port.error());
-    return ExitCode::kNoNetwork;
+    return ExitCode::no_connection;
   }
 
   std::unique_ptr<Terminal> terminal = Terminal::open({STDIN_FILENO, STDOUT_FILENO});
@@ -164,10 +167,10 @@ ExitCode run_viewer(const DemoOptions& options) {
   const std::optional<Error> error = viewer.run();
   terminal.reset();
   if (error) complain(*error);
-  if (error && !viewer.monitor().info()) return ExitCode::kLost;
-  if (!show_summary(viewer, style, interactive)) return ExitCode::kLost;
-  return complaints_about(viewer.monitor(), viewer.record()).empty() ? ExitCode::kGood
-                                                                     : ExitCode::kLost;
+  if (error && !viewer.monitor().info()) return ExitCode::failed;
+  if (!show_summary(viewer, style, interactive)) return ExitCode::failed;
+  return complaints_about(viewer.monitor(), viewer.record()).empty() ? ExitCode::done
+                                                                     : ExitCode::failed;
 }
 
 // Runs the two laboratories; prints the summary at the end.
@@ -186,10 +189,10 @@ ExitCode run_laboratories(const DemoOptions& options) {
   terminal.reset();
   if (!record) {
     complain(record.error());
-    return ExitCode::kNoNetwork;
+    return ExitCode::no_connection;
   }
-  if (!show(summary_text(*record))) return ExitCode::kLost;
-  return complaints_about(*record).empty() ? ExitCode::kGood : ExitCode::kLost;
+  if (!show(summary_text(*record))) return ExitCode::failed;
+  return complaints_about(*record).empty() ? ExitCode::done : ExitCode::failed;
 }
 
 }  // namespace
@@ -203,10 +206,10 @@ int main(int count, char** words) {
   const gimnet::Result<DemoOptions> options = parse_options(all.empty() ? all : all.subspan(1));
   if (!options) {
     (void)std::fprintf(stderr, "gimnet-demo: %s\n", options.error().sentence.c_str());
-    return static_cast<int>(ExitCode::kUsage);
+    return static_cast<int>(ExitCode::usage);
   }
   if (options->help) {
-    return static_cast<int>(show(std::string(usage_text())) ? ExitCode::kGood : ExitCode::kLost);
+    return static_cast<int>(show(std::string(usage_text())) ? ExitCode::done : ExitCode::failed);
   }
   // The viewer takes its time to let everything arrive, and then ends the others.
   constexpr unsigned kRobotPatience_s = 1;

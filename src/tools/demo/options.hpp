@@ -10,9 +10,6 @@
 
 namespace gimnet::demo {
 
-/// Exit codes of the demo.
-enum class ExitCode : std::uint8_t { kGood = 0, kLost = 1, kUsage = 2, kNoNetwork = 3 };
-
 /// The part of the demo that this process is.
 enum class Role : std::uint8_t { kAll, kRobot, kView };
 

@@ -212,9 +212,9 @@ namespace {
 
 /// Places of nodes, as their hubs see them. A node that came or went between the two listings has
 /// no place.
-class Places {
+class PlaceIndex {
  public:
-  explicit Places(const std::vector<NodeRecord>& nodes) {
+  explicit PlaceIndex(const std::vector<NodeRecord>& nodes) {
     for (const NodeRecord& node : nodes) by_id_.emplace(node.node.id, node.place);
   }
   [[nodiscard]] std::string_view of(Peer node) const {
@@ -226,14 +226,14 @@ class Places {
   std::unordered_map<std::uint32_t, std::string> by_id_;
 };
 
-std::string json_of(const std::vector<ServiceRecord>& services, const Places& places) {
+std::string json_of(const std::vector<ServiceRecord>& services, const PlaceIndex& places) {
   JsonWriter json;
   json.begin_array();
   for (const ServiceRecord& service : services) write(json, service, places.of(service.node));
   return json.end_array().str() + "\n";
 }
 
-std::string table_of(const std::vector<ServiceRecord>& services, const Places& places,
+std::string table_of(const std::vector<ServiceRecord>& services, const PlaceIndex& places,
                      Paint paint) {
   Table table({"NAME", "NODE", "HUB", "PLACE", "TYPE", "DIRECTION", "DELIVERY", "RETAIN",
                "SUBSCRIBERS", "METADATA"});
@@ -259,7 +259,7 @@ ExitCode run_services(ToolSession& session) {
     if (!found) return session.fail(found.failure());
     nodes = std::move(*found);
   }
-  const Places places(nodes);
+  const PlaceIndex places(nodes);
   session.output().write(session.options().json ? json_of(*services, places)
                                                 : table_of(*services, places, session.paint()));
   if (services->empty() && !session.options().target.empty())

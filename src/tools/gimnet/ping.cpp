@@ -30,7 +30,7 @@ RoundTrips::Summary RoundTrips::summary_us() const {
 
 namespace {
 
-struct Tally {
+struct PingCounts {
   RoundTrips round_trips;
   std::uint64_t sent = 0;
   std::uint64_t lost = 0;
@@ -38,21 +38,21 @@ struct Tally {
 
 std::string one_decimal(double value) { return decimal(value, 1); }
 
-void print_json(ToolSession& session, Peer peer, const Tally& tally) {
-  const RoundTrips::Summary us = tally.round_trips.summary_us();
+void print_json(ToolSession& session, Peer peer, const PingCounts& counts) {
+  const RoundTrips::Summary us = counts.round_trips.summary_us();
   JsonWriter json;
   json.begin_object().member("target", session.options().target).member("id", peer.text());
-  json.member("sent", tally.sent).member("lost", tally.lost);
+  json.member("sent", counts.sent).member("lost", counts.lost);
   json.member("min", us.min).member("mean", us.mean).member("p50", us.p50).member("p99", us.p99);
   json.member("p99.9", us.p99_9).member("max", us.max).end_object();
   session.output().write(json.str() + "\n");
 }
 
-void print_text(ToolSession& session, const Tally& tally) {
-  const RoundTrips::Summary us = tally.round_trips.summary_us();
-  session.output().write(std::to_string(tally.sent) + " sent, " + std::to_string(tally.lost) +
+void print_text(ToolSession& session, const PingCounts& counts) {
+  const RoundTrips::Summary us = counts.round_trips.summary_us();
+  session.output().write(std::to_string(counts.sent) + " sent, " + std::to_string(counts.lost) +
                          " lost\n");
-  if (tally.round_trips.count() == 0) return;
+  if (counts.round_trips.count() == 0) return;
   session.output().write("round trip in us: min " + one_decimal(us.min) + ", mean " +
                          one_decimal(us.mean) + ", p50 " + one_decimal(us.p50) + ", p99 " +
                          one_decimal(us.p99) + ", p99.9 " + one_decimal(us.p99_9) + ", max " +
@@ -60,20 +60,20 @@ void print_text(ToolSession& session, const Tally& tally) {
 }
 
 /// Nothing: go on.
-std::optional<Failure> ping_once(ToolSession& session, Peer peer, Tally& tally) {
+std::optional<Failure> ping_once(ToolSession& session, Peer peer, PingCounts& counts) {
   const ToolOptions& options = session.options();
-  ++tally.sent;
+  ++counts.sent;
   const auto answer =
       session.node().ping(peer, Timeout{std::llround(options.timeout_s * 1000.0)}, options.lane);
   if (answer) {
-    tally.round_trips.add(*answer);
+    counts.round_trips.add(*answer);
   } else if (answer.is(Status::bad_argument)) {
-    --tally.sent;
+    --counts.sent;
     return answer.failure();
   } else if (session.stopped()) {
-    --tally.sent;
+    --counts.sent;
   } else {
-    ++tally.lost;
+    ++counts.lost;
     if (!answer.is(Status::timeout)) return answer.failure();
   }
   if (options.json || session.stopped()) return std::nullopt;
@@ -93,19 +93,19 @@ ExitCode run_ping(ToolSession& session) {
   if (const auto ending = session.join(how)) return *ending;
   const auto peer = session.find(options.target);
   if (!peer) return session.code();
-  Tally tally;
+  PingCounts counts;
   std::optional<Failure> failure;
   const auto interval_ns = static_cast<std::int64_t>(std::llround(options.interval_s * 1e9));
   std::int64_t next_ns = steady_now_ns();
-  while (tally.sent < options.pings && !failure && session.stop().wait_until(next_ns)) {
-    failure = ping_once(session, *peer, tally);
+  while (counts.sent < options.pings && !failure && session.stop().wait_until(next_ns)) {
+    failure = ping_once(session, *peer, counts);
     next_ns = std::max(next_ns + interval_ns, steady_now_ns());
   }
-  if (failure && tally.sent == 0) return session.fail(*failure);
+  if (failure && counts.sent == 0) return session.fail(*failure);
   if (options.json) {
-    print_json(session, *peer, tally);
+    print_json(session, *peer, counts);
   } else {
-    print_text(session, tally);
+    print_text(session, counts);
   }
   session.output().flush();
   if (failure) {
@@ -113,9 +113,9 @@ ExitCode run_ping(ToolSession& session) {
     return failure->status == Status::not_delivered ? ExitCode::not_found
                                                     : exit_code_of(failure->status);
   }
-  if (tally.round_trips.count() == 0 && !session.stopped()) {
+  if (counts.round_trips.count() == 0 && !session.stopped()) {
     return session.fail({Status::timeout, options.target + " answered none of " +
-                                              std::to_string(tally.sent) + " pings"});
+                                              std::to_string(counts.sent) + " pings"});
   }
   return session.finish();
 }

@@ -156,7 +156,7 @@ TEST_F(SourcesTest, AVariableThatIsEmptyIsNoPlace) {
   sources_.file.clear();
   environment({"TCPHUB_STATE_DIR=", "TCPHUB_CONFIG="});
   std::vector<std::string> lines;
-  for (const Fault& fault : read().faults) lines.push_back(fault.line());
+  for (const ConfigFault& fault : read().faults) lines.push_back(fault.line());
   EXPECT_THAT(lines,
               ElementsAre("tcphub: TCPHUB_CONFIG is empty: give it a TOML file's path, or unset it",
                           "tcphub: TCPHUB_STATE_DIR is empty: give it a folder, or leave it out"));
@@ -271,7 +271,7 @@ TEST_F(SourcesTest, APipeIsReadAtTheStartAndNeverInPlaceOfAPart) {
 TEST_F(SourcesTest, FaultsComeInTheOrderOfTheFile) {
   write("hub.toml", "shards = 99\nx = 1\nhub_id = 0\n");
   std::vector<std::string> lines;
-  for (const Fault& fault : read().faults)
+  for (const ConfigFault& fault : read().faults)
     lines.push_back(fault.line().substr(folder_.path("hub.toml").size(), 3));
   EXPECT_THAT(lines, ElementsAre(":1:", ":2:", ":3:"));
 }

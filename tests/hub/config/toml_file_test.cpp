@@ -14,7 +14,7 @@ using ::testing::StartsWith;
 
 std::vector<std::string> places(const TomlFile& file) {
   std::vector<std::string> found;
-  for (const Fault& fault : file.faults) found.push_back(fault.place);
+  for (const ConfigFault& fault : file.faults) found.push_back(fault.place);
   return found;
 }
 
