@@ -115,10 +115,11 @@ class World final : public nif::InboundHost {
 
 /// A DATA of the peer that asks for an ACK, in one fragment or two.
 std::vector<std::vector<std::byte>> good_frames(std::uint32_t sequence, std::string_view text) {
-  using proto::gimi::Operation;
+  using proto::gimi::MessageOperation;
   std::array<std::byte, proto::gimi::kMessagePrefixMax> prefix{};
   const std::size_t size = proto::gimi::write_message_prefix(
-      {sequence, Operation::data, proto::gimi::kFlagAckWanted, 0, kEpoch}, std::nullopt, prefix);
+      {sequence, MessageOperation::data, proto::gimi::kFlagAckWanted, 0, kEpoch}, std::nullopt,
+      prefix);
   std::vector<std::byte> payload(prefix.begin(),
                                  prefix.begin() + static_cast<std::ptrdiff_t>(size));
   for (const char c : text) payload.push_back(static_cast<std::byte>(c));

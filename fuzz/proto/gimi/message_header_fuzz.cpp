@@ -35,8 +35,8 @@ void check_data(const MessageView& message) {
     const std::size_t size = encode_ack(*ack, written);
     FUZZ_MUST(fuzz::same(std::span(written).first(size), message.data.first(size)));
   }
-  if (const auto failure = decode_failure(message.data)) {
-    const auto again = encode_failure(*failure);
+  if (const auto failure = decode_error(message.data)) {
+    const auto again = encode_error(*failure);
     // A group id of 0 may come, and is not written.
     const bool same = fuzz::same(std::span(again), message.data);
     FUZZ_MUST(same ||

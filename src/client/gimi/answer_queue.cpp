@@ -9,7 +9,7 @@
 namespace gimnet::gimi {
 namespace {
 
-using proto::gimi::Operation;
+using proto::gimi::MessageOperation;
 using proto::gimi::RequestFault;
 
 std::uint64_t name_of(const proto::gimi::MessageHeader& header) {
@@ -50,7 +50,7 @@ void AnswerQueue::drop_late() {
   source_.update(!waiting_.empty() || end_);
 }
 
-nif_status AnswerQueue::send(const Way& way, std::uint64_t name, Operation operation,
+nif_status AnswerQueue::send(const Way& way, std::uint64_t name, MessageOperation operation,
                              BytesView data, std::int32_t timeout_ms) const {
   const Envelope envelope{way.to.id, NIF_UNICAST, NIF_POLICY_DEFAULT, way.lane, way.key, 0, 0};
   return uplink_.transmit(
@@ -61,11 +61,11 @@ nif_status AnswerQueue::send(const Way& way, std::uint64_t name, Operation opera
 
 /// Does not wait: if the way is full, the time of the request tells.
 void AnswerQueue::refuse(const Way& way, std::uint64_t name, RequestFault fault) const {
-  static_cast<void>(
-      send(way, name, Operation::error, proto::gimi::encode_request_error({fault, 0, ""}), 0));
+  static_cast<void>(send(way, name, MessageOperation::error,
+                         proto::gimi::encode_request_error({fault, 0, ""}), 0));
 }
 
-Outcome<void> AnswerQueue::answer(std::uint64_t name, Operation operation, BytesView data,
+Outcome<void> AnswerQueue::answer(std::uint64_t name, MessageOperation operation, BytesView data,
                                   Timeout timeout) {
   Way way;
   {
@@ -85,12 +85,12 @@ Outcome<void> AnswerQueue::answer(std::uint64_t name, Operation operation, Bytes
 }
 
 Outcome<void> AnswerQueue::reply(std::uint64_t name, BytesView data, Timeout timeout) {
-  return answer(name, Operation::reply, data, timeout);
+  return answer(name, MessageOperation::reply, data, timeout);
 }
 
 Outcome<void> AnswerQueue::fail(std::uint64_t name, const proto::gimi::RequestError& error) {
   const auto data = proto::gimi::encode_request_error(error);
-  return answer(name, Operation::error, data, Timeout{kLeaveTimeoutMs});
+  return answer(name, MessageOperation::error, data, Timeout{kLeaveTimeoutMs});
 }
 
 void AnswerQueue::keep(Answer answer) {

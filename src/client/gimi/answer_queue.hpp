@@ -76,14 +76,14 @@ class AnswerQueue {
   };
   struct Answer {
     std::uint64_t name = 0;
-    proto::gimi::Operation operation{};
+    proto::gimi::MessageOperation operation{};
     std::vector<std::byte> data;
   };
   [[nodiscard]] nif_status send(const Way& way, std::uint64_t name,
-                                proto::gimi::Operation operation, BytesView data,
+                                proto::gimi::MessageOperation operation, BytesView data,
                                 std::int32_t timeout_ms) const;
   void refuse(const Way& way, std::uint64_t name, proto::gimi::RequestFault fault) const;
-  [[nodiscard]] Outcome<void> answer(std::uint64_t name, proto::gimi::Operation operation,
+  [[nodiscard]] Outcome<void> answer(std::uint64_t name, proto::gimi::MessageOperation operation,
                                      BytesView data, Timeout timeout) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] bool is_full() const GIMNET_REQUIRES(mutex_) {
     return waiting_.size() >= kWaitingMax || waiting_bytes_ >= bytes_max_;

@@ -115,8 +115,9 @@ nif_status Clerk::send_ack(const StreamName& sender, Lane lane, AckBook::Entry t
   const std::size_t size = proto::gimi::encode_ack({taken.bitmap, pong, sender.group}, memory);
   const std::span<const std::byte> data = std::span(memory).first(size);
   const Envelope envelope{sender.peer.id, NIF_UNICAST, NIF_POLICY_DEFAULT, lane, sender.key, 0, 0};
-  return uplink_.transmit(
-      envelope, {taken.sequence, proto::gimi::Operation::ack, 0, 0, taken.epoch}, false, data, 0);
+  return uplink_.transmit(envelope,
+                          {taken.sequence, proto::gimi::MessageOperation::ack, 0, 0, taken.epoch},
+                          false, data, 0);
 }
 
 void Clerk::attend(bool at_once) {

@@ -207,9 +207,9 @@ Outcome<TracedPing> Core::ping(Peer to, Timeout timeout, Lane lane, BytesView ec
   pings_.expect(number, to);
   Envelope envelope{to.id, NIF_UNICAST, NIF_POLICY_DEFAULT, lane, {}, 0, NIF_FLAG_REPORT};
   if (traced) envelope.trace_slots = kTraceHopsMax;
-  const nif_status status =
-      uplink_.transmit(envelope, {number, proto::gimi::Operation::ping, 0, 0, pings_.epoch()},
-                       false, data, nif_timeout(timeout));
+  const nif_status status = uplink_.transmit(
+      envelope, {number, proto::gimi::MessageOperation::ping, 0, 0, pings_.epoch()}, false, data,
+      nif_timeout(timeout));
   if (status == NIF_OK) return pings_.wait(number, deadline, timeout);
   pings_.forget(number);
   return failure_of(status, "ping " + to.text());

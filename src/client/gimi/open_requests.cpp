@@ -136,7 +136,7 @@ std::optional<OpenRequests::Sending> OpenRequests::prepare(std::uint32_t number,
   open.again_ns = 0;
   return Sending{
       {place.group, NIF_SERVICE, NIF_POLICY_DEFAULT, open.lane, place.key, 0, NIF_FLAG_REPORT},
-      {number, proto::gimi::Operation::request, flags, 0, epoch_},
+      {number, proto::gimi::MessageOperation::request, flags, 0, epoch_},
       open.message};
 }
 

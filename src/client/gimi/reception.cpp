@@ -92,7 +92,7 @@ std::optional<proto::gimi::MessageHeader> reported_header(const nif_incoming& in
 }  // namespace
 
 nif_verdict Reception::on_message(const nif_incoming& in) {
-  using proto::gimi::Operation;
+  using proto::gimi::MessageOperation;
   if ((in.flags & NIF_FLAG_KEYED) == 0) return on_plain(in);
   const auto view = proto::gimi::parse_message(payload_of(in));
   if (!view) {
@@ -100,22 +100,22 @@ nif_verdict Reception::on_message(const nif_incoming& in) {
     return NIF_DONE;
   }
   switch (view->header.operation) {
-    case Operation::data:
+    case MessageOperation::data:
       return on_data(in, *view);
-    case Operation::request:
+    case MessageOperation::request:
       return on_request(in, *view);
-    case Operation::reply:
+    case MessageOperation::reply:
       return on_reply(in, *view);
-    case Operation::ack:
+    case MessageOperation::ack:
       on_ack(in, *view);
       return NIF_DONE;
-    case Operation::error:
+    case MessageOperation::error:
       on_error(in, *view);
       return NIF_DONE;
-    case Operation::ping:
+    case MessageOperation::ping:
       on_ping(in, *view);
       return NIF_DONE;
-    case Operation::pong:
+    case MessageOperation::pong:
       if (view->header.epoch == pings_.epoch())
         pings_.on_pong(view->header.sequence, Peer{in.from}, way_of(in));
       return NIF_DONE;
@@ -200,8 +200,9 @@ nif_verdict Reception::refuse(const nif_incoming& in, const proto::gimi::Message
       in.from, NIF_UNICAST, NIF_POLICY_DEFAULT, static_cast<Lane>(in.lane), name.key, 0, 0};
   // If there is no room for it, the sender learns from the next PONG that the message is missing.
   static_cast<void>(uplink_.transmit(
-      envelope, {view.header.sequence, proto::gimi::Operation::error, 0, 0, view.header.epoch},
-      false, proto::gimi::encode_failure({kTooLarge, sentence, name.group}), 0));
+      envelope,
+      {view.header.sequence, proto::gimi::MessageOperation::error, 0, 0, view.header.epoch}, false,
+      proto::gimi::encode_error({kTooLarge, sentence, name.group}), 0));
   return NIF_DONE;
 }
 
@@ -224,7 +225,8 @@ nif_verdict Reception::on_request(const nif_incoming& in, const proto::gimi::Mes
     const Envelope envelope{
         in.from, NIF_UNICAST, NIF_POLICY_DEFAULT, message.lane(), message.key(), 0, 0};
     static_cast<void>(uplink_.transmit(
-        envelope, {view.header.sequence, proto::gimi::Operation::error, 0, 0, view.header.epoch},
+        envelope,
+        {view.header.sequence, proto::gimi::MessageOperation::error, 0, 0, view.header.epoch},
         false, proto::gimi::encode_request_error({fault, 0, ""}), 0));
   }
   disown(std::move(message));
@@ -246,7 +248,7 @@ void Reception::on_error(const nif_incoming& in, const proto::gimi::MessageView&
     const std::string sentence = plain_words(error->sentence);
     return requests_.on_error(view.header, Peer{in.from}, {error->fault, error->code, sentence});
   }
-  const auto failure = proto::gimi::decode_failure(view.data);
+  const auto failure = proto::gimi::decode_error(view.data);
   if (!failure || failure->status != kTooLarge) return inbox_.count_dropped();
   streams_.on_refused(
       stream_of(in, in.from, failure->group), view.header,
@@ -270,8 +272,9 @@ void Reception::on_ping(const nif_incoming& in, const proto::gimi::MessageView& 
   Envelope envelope{in.from, NIF_UNICAST, NIF_POLICY_DEFAULT, lane, name.key, 0, 0};
   if (proto::find_trace(extensions_of(in))) envelope.trace_slots = kTraceHopsMax;
   static_cast<void>(uplink_.transmit(
-      envelope, {view.header.sequence, proto::gimi::Operation::pong, 0, 0, view.header.epoch},
-      false, view.data, 0));
+      envelope,
+      {view.header.sequence, proto::gimi::MessageOperation::pong, 0, 0, view.header.epoch}, false,
+      view.data, 0));
 }
 
 void Reception::on_report(const nif_incoming& in) {
@@ -280,7 +283,7 @@ void Reception::on_report(const nif_incoming& in) {
   const auto header = reported_header(in);
   if (in.reason == NIF_DROP_NOT_RETAINED) return services_.on_not_retained(in.to, header);
   if (!is_for_one(in)) return;
-  if (header && header->operation == proto::gimi::Operation::request) {
+  if (header && header->operation == proto::gimi::MessageOperation::request) {
     if (header->epoch == requests_.epoch())
       requests_.on_report(header->sequence, in.reason, report_words(in.text));
     return;
@@ -289,11 +292,11 @@ void Reception::on_report(const nif_incoming& in) {
   const StreamName name = stream_of(in, to_service ? 0 : in.to, to_service ? in.to : 0);
   const bool keyed = (in.flags & NIF_FLAG_KEYED) != 0;
   StreamTable::Report report{name, keyed, in.reason, in.count, 0, 0, in.text};
-  if (header && header->operation == proto::gimi::Operation::data) {
+  if (header && header->operation == proto::gimi::MessageOperation::data) {
     report.sequence = header->sequence;
     report.epoch = header->epoch;
   }
-  if (header && header->operation == proto::gimi::Operation::ping &&
+  if (header && header->operation == proto::gimi::MessageOperation::ping &&
       header->epoch == pings_.epoch()) {
     pings_.on_lost(header->sequence, report_words(report.text));
   }

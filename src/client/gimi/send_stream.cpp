@@ -8,7 +8,7 @@
 namespace gimnet::gimi {
 namespace {
 
-using proto::gimi::Operation;
+using proto::gimi::MessageOperation;
 
 Loss withdrawn() { return {LossReason::service_gone, "the service was withdrawn"}; }
 
@@ -26,8 +26,8 @@ Outcome<void> SendStream::send(BytesView data, Timeout timeout, More more) {
     sequence = window_.open(data.size(), steady_now_ns());
     to = destination_;
   }
-  const nif_status status = transmit(to, {sequence, Operation::data, 0, 0, to.epoch}, data, more,
-                                     nif_timeout_until(deadline));
+  const nif_status status = transmit(to, {sequence, MessageOperation::data, 0, 0, to.epoch}, data,
+                                     more, nif_timeout_until(deadline));
   auto failure = status == NIF_OK ? Failure{} : failure_of(status, "send to " + target());
   bool unwatched = false;
   {
@@ -102,14 +102,14 @@ nif_status SendStream::transmit(const Destination& to, const proto::gimi::Messag
   if (more == More::yes) envelope.flags |= NIF_FLAG_MORE;
   proto::gimi::MessageHeader asking = header;
   if (synchronized) asking.flags |= proto::gimi::kFlagAckWanted;
-  const bool stamped = options_.timestamp && header.operation == Operation::data;
+  const bool stamped = options_.timestamp && header.operation == MessageOperation::data;
   return uplink_.transmit(envelope, asking, stamped, data, timeout_ms);
 }
 
 nif_status SendStream::transmit_ping(const Destination& to, std::uint32_t number) const {
   std::array<std::byte, proto::gimi::kPingTimeSize> sent;
   store_le(sent.data(), wall_now_ns());
-  return transmit(to, {number, Operation::ping, 0, 0, to.epoch}, sent, More::no, 0);
+  return transmit(to, {number, MessageOperation::ping, 0, 0, to.epoch}, sent, More::no, 0);
 }
 
 /// True: somebody should watch over the stream. Another thread may have left a message to be held
@@ -286,7 +286,7 @@ bool SendStream::tick(std::int64_t now_ns) {
   }
   if (data) {
     const nif_status status =
-        transmit(to, {sequence, Operation::data, 0, 0, to.epoch}, *data, More::no, 0);
+        transmit(to, {sequence, MessageOperation::data, 0, 0, to.epoch}, *data, More::no, 0);
     const MutexLock lock(mutex_);
     static_cast<void>(finish(sequence, status, More::no));
     // Before the turn is anybody else's, whose message is newer.

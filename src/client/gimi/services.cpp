@@ -45,7 +45,7 @@ Outcome<void> PublishedService::publish(BytesView data, Timeout timeout, More mo
     sending_ = true;
   }
   const nif_status status =
-      uplink_.transmit(envelope, {sequence, proto::gimi::Operation::data, 0, 0, epoch_},
+      uplink_.transmit(envelope, {sequence, proto::gimi::MessageOperation::data, 0, 0, epoch_},
                        options_.timestamp, data, nif_timeout_until(deadline));
   const bool sent = status == NIF_OK || status == NIF_NOT_RETAINED;
   Failure failure;

@@ -315,14 +315,14 @@ void Inbound::add_moved(const proto::ns::ServiceMoved& event) {
 
 Inbound::Verdict Inbound::take_event(const proto::ControlView& event,
                                      std::span<const std::byte> payload) {
-  switch (static_cast<proto::ns::Operation>(event.header.operation)) {
-    case proto::ns::Operation::service_moved: {
+  switch (static_cast<proto::ns::NsOperation>(event.header.operation)) {
+    case proto::ns::NsOperation::service_moved: {
       const auto moved = proto::decode<proto::ns::ServiceMoved>(payload);
       if (!moved) return malformed(moved.error().sentence);
       if (host_.on_service_moved(*moved)) add_moved(*moved);
       return Verdict::going;
     }
-    case proto::ns::Operation::subscribers: {
+    case proto::ns::NsOperation::subscribers: {
       const auto subscribers = proto::decode<proto::ns::Subscribers>(payload);
       if (!subscribers) return malformed(subscribers.error().sentence);
       Record* record = make_event(NIF_SUBSCRIBERS, "");
@@ -331,9 +331,9 @@ Inbound::Verdict Inbound::take_event(const proto::ControlView& event,
       add_record(record, 0);
       return Verdict::going;
     }
-    case proto::ns::Operation::watch_events:
+    case proto::ns::NsOperation::watch_events:
       return take_watch_events(payload);
-    case proto::ns::Operation::name_lost:
+    case proto::ns::NsOperation::name_lost:
       return take_name_lost(payload);
     default:
       ++counts_.ignored;

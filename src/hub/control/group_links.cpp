@@ -104,17 +104,17 @@ void GroupLinks::take(LinkNumber link, std::span<const std::byte> payload) {
   const auto read = [&](auto&& message) {
     message ? trees_.take(link, *message) : void(++malformed_);
   };
-  switch (static_cast<route::Operation>(view->header.operation)) {
-    case route::Operation::join:
+  switch (static_cast<route::RouteOperation>(view->header.operation)) {
+    case route::RouteOperation::join:
       read(proto::decode<route::Join>(payload));
       break;
-    case route::Operation::leave:
+    case route::RouteOperation::leave:
       read(proto::decode<route::Leave>(payload));
       break;
-    case route::Operation::joins_end:
+    case route::RouteOperation::joins_end:
       read(proto::decode<route::JoinsEnd>(payload));
       break;
-    case route::Operation::joined:
+    case route::RouteOperation::joined:
       read(proto::decode<route::Joined>(payload));
       break;
     default:

@@ -183,14 +183,14 @@ void Links::on_route(const SessionRef& session, std::uint32_t attachment,
   if (!link->exchange_begun) begin_exchange(*link, moment);
   const auto control = proto::split_control(payload);
   if (!control) return;
-  switch (static_cast<proto::route::Operation>(control->header.operation)) {
-    case proto::route::Operation::record:
+  switch (static_cast<proto::route::RouteOperation>(control->header.operation)) {
+    case proto::route::RouteOperation::record:
       network_.take_record(link->number(), {payload.begin(), payload.end()}, moment.now);
       break;
-    case proto::route::Operation::records_end:
+    case proto::route::RouteOperation::records_end:
       network_.take_mark(link->number());
       break;
-    case proto::route::Operation::keep_alive: {
+    case proto::route::RouteOperation::keep_alive: {
       const auto heard = proto::decode<proto::route::KeepAlive>(payload);
       if (!heard) break;
       if (link->hear_keep_alive(*heard, moment.now, moment.wall_ns))

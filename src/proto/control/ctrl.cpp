@@ -26,32 +26,32 @@ std::vector<Counter> read_counters(Fields& counters) {
 }  // namespace
 
 const char* operation_name(std::uint16_t operation) {
-  switch (static_cast<Operation>(operation)) {
-    case Operation::hub_info:
+  switch (static_cast<CtrlOperation>(operation)) {
+    case CtrlOperation::hub_info:
       return "hub_info";
-    case Operation::statistics:
+    case CtrlOperation::statistics:
       return "statistics";
-    case Operation::connections:
+    case CtrlOperation::connections:
       return "connections";
-    case Operation::kick:
+    case CtrlOperation::kick:
       return "kick";
-    case Operation::reassign:
+    case CtrlOperation::reassign:
       return "reassign";
-    case Operation::drain:
+    case CtrlOperation::drain:
       return "drain";
-    case Operation::reload:
+    case CtrlOperation::reload:
       return "reload";
-    case Operation::log_level:
+    case CtrlOperation::log_level:
       return "log_level";
-    case Operation::hubs:
+    case CtrlOperation::hubs:
       return "hubs";
-    case Operation::links:
+    case CtrlOperation::links:
       return "links";
-    case Operation::link_add:
+    case CtrlOperation::link_add:
       return "link_add";
-    case Operation::link_remove:
+    case CtrlOperation::link_remove:
       return "link_remove";
-    case Operation::link_cost:
+    case CtrlOperation::link_cost:
       return "link_cost";
   }
   return nullptr;

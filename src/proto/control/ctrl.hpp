@@ -14,7 +14,7 @@
 
 namespace gimnet::proto::ctrl {
 
-enum class Operation : std::uint16_t {
+enum class CtrlOperation : std::uint16_t {
   hub_info = 1,
   statistics = 2,
   connections = 3,
@@ -30,10 +30,10 @@ enum class Operation : std::uint16_t {
   link_cost = 13,
 };
 
-[[nodiscard]] constexpr std::uint16_t request_of(Operation operation) {
+[[nodiscard]] constexpr std::uint16_t request_of(CtrlOperation operation) {
   return static_cast<std::uint16_t>(operation);
 }
-[[nodiscard]] constexpr std::uint16_t answer_of(Operation operation) {
+[[nodiscard]] constexpr std::uint16_t answer_of(CtrlOperation operation) {
   return static_cast<std::uint16_t>(request_of(operation) | kAnswerBit);
 }
 
@@ -49,7 +49,7 @@ inline constexpr std::uint32_t kPageRecordsDefault = 256;
 // HUB_INFO: who are you?
 
 struct HubInfo {
-  static constexpr std::uint16_t kOperation = request_of(Operation::hub_info);
+  static constexpr std::uint16_t kOperation = request_of(CtrlOperation::hub_info);
   static constexpr const char* kName = "HUB_INFO";
   void write(bitestream::Writer&) const {}
   [[nodiscard]] static HubInfo read(Fields&) { return {}; }
@@ -57,7 +57,7 @@ struct HubInfo {
 };
 
 struct HubInfoAnswer {
-  static constexpr std::uint16_t kOperation = answer_of(Operation::hub_info);
+  static constexpr std::uint16_t kOperation = answer_of(CtrlOperation::hub_info);
   static constexpr const char* kName = "answer to HUB_INFO";
   HubId hub;
   std::string hub_name;
@@ -74,7 +74,7 @@ struct HubInfoAnswer {
 // STATISTICS: every counter of every shard
 
 struct Statistics {
-  static constexpr std::uint16_t kOperation = request_of(Operation::statistics);
+  static constexpr std::uint16_t kOperation = request_of(CtrlOperation::statistics);
   static constexpr const char* kName = "STATISTICS";
   void write(bitestream::Writer&) const {}
   [[nodiscard]] static Statistics read(Fields&) { return {}; }
@@ -98,7 +98,7 @@ struct ShardRecord {
 };
 
 struct StatisticsAnswer {
-  static constexpr std::uint16_t kOperation = answer_of(Operation::statistics);
+  static constexpr std::uint16_t kOperation = answer_of(CtrlOperation::statistics);
   static constexpr const char* kName = "answer to STATISTICS";
   std::vector<ShardRecord> shards;
   void write(bitestream::Writer& writer) const;
@@ -109,7 +109,7 @@ struct StatisticsAnswer {
 // CONNECTIONS: who is connected where, in pages of ascending node ids
 
 struct Connections {
-  static constexpr std::uint16_t kOperation = request_of(Operation::connections);
+  static constexpr std::uint16_t kOperation = request_of(CtrlOperation::connections);
   static constexpr const char* kName = "CONNECTIONS";
   NodeId after;  ///< continue after this one; 0: from the start
   std::uint32_t records_max = kPageRecordsDefault;
@@ -144,7 +144,7 @@ struct ConnectionRecord {
 [[nodiscard]] std::size_t page_bytes_max(const ConnectionRecord& record);
 
 struct ConnectionsAnswer {
-  static constexpr std::uint16_t kOperation = answer_of(Operation::connections);
+  static constexpr std::uint16_t kOperation = answer_of(CtrlOperation::connections);
   static constexpr const char* kName = "answer to CONNECTIONS";
   std::vector<ConnectionRecord> connections;
   bool more = false;
@@ -158,7 +158,7 @@ struct ConnectionsAnswer {
 // KICK: ends a node's session, its connection with GOODBYE `kicked`
 
 struct Kick {
-  static constexpr std::uint16_t kOperation = request_of(Operation::kick);
+  static constexpr std::uint16_t kOperation = request_of(CtrlOperation::kick);
   static constexpr const char* kName = "KICK";
   NodeId node;
   std::string reason;  ///< told to the node; at most 256 bytes
@@ -168,7 +168,7 @@ struct Kick {
 };
 
 struct KickAnswer {
-  static constexpr std::uint16_t kOperation = answer_of(Operation::kick);
+  static constexpr std::uint16_t kOperation = answer_of(CtrlOperation::kick);
   static constexpr const char* kName = "answer to KICK";
   std::string remark;  ///< what the hub cannot promise; "": nothing
   void write(bitestream::Writer& writer) const;
@@ -179,7 +179,7 @@ struct KickAnswer {
 // REASSIGN: a node goes on under another id of the same hub
 
 struct Reassign {
-  static constexpr std::uint16_t kOperation = request_of(Operation::reassign);
+  static constexpr std::uint16_t kOperation = request_of(CtrlOperation::reassign);
   static constexpr const char* kName = "REASSIGN";
   NodeId node;
   NodeId new_node;
@@ -189,7 +189,7 @@ struct Reassign {
 };
 
 struct ReassignAnswer {
-  static constexpr std::uint16_t kOperation = answer_of(Operation::reassign);
+  static constexpr std::uint16_t kOperation = answer_of(CtrlOperation::reassign);
   static constexpr const char* kName = "answer to REASSIGN";
   void write(bitestream::Writer&) const {}
   [[nodiscard]] static ReassignAnswer read(Fields&) { return {}; }
@@ -199,7 +199,7 @@ struct ReassignAnswer {
 // DRAIN: the hub ends as at SIGTERM
 
 struct Drain {
-  static constexpr std::uint16_t kOperation = request_of(Operation::drain);
+  static constexpr std::uint16_t kOperation = request_of(CtrlOperation::drain);
   static constexpr const char* kName = "DRAIN";
   void write(bitestream::Writer&) const {}
   [[nodiscard]] static Drain read(Fields&) { return {}; }
@@ -207,7 +207,7 @@ struct Drain {
 };
 
 struct DrainAnswer {
-  static constexpr std::uint16_t kOperation = answer_of(Operation::drain);
+  static constexpr std::uint16_t kOperation = answer_of(CtrlOperation::drain);
   static constexpr const char* kName = "answer to DRAIN";
   void write(bitestream::Writer&) const {}
   [[nodiscard]] static DrainAnswer read(Fields&) { return {}; }
@@ -217,7 +217,7 @@ struct DrainAnswer {
 // RELOAD: the hub reads its configuration again
 
 struct Reload {
-  static constexpr std::uint16_t kOperation = request_of(Operation::reload);
+  static constexpr std::uint16_t kOperation = request_of(CtrlOperation::reload);
   static constexpr const char* kName = "RELOAD";
   void write(bitestream::Writer&) const {}
   [[nodiscard]] static Reload read(Fields&) { return {}; }
@@ -237,7 +237,7 @@ struct ChangeRecord {
 [[nodiscard]] std::size_t page_bytes_max(const ChangeRecord& record);
 
 struct ReloadAnswer {
-  static constexpr std::uint16_t kOperation = answer_of(Operation::reload);
+  static constexpr std::uint16_t kOperation = answer_of(CtrlOperation::reload);
   static constexpr const char* kName = "answer to RELOAD";
   std::vector<ChangeRecord> changes;
   bool more = false;  ///< there were more than fit in a frame
@@ -249,7 +249,7 @@ struct ReloadAnswer {
 // LOG_LEVEL: until the next reload or start
 
 struct SetLogLevel {
-  static constexpr std::uint16_t kOperation = request_of(Operation::log_level);
+  static constexpr std::uint16_t kOperation = request_of(CtrlOperation::log_level);
   static constexpr const char* kName = "LOG_LEVEL";
   std::string level;  ///< error, warning, info, debug or off
   void write(bitestream::Writer& writer) const;
@@ -258,7 +258,7 @@ struct SetLogLevel {
 };
 
 struct SetLogLevelAnswer {
-  static constexpr std::uint16_t kOperation = answer_of(Operation::log_level);
+  static constexpr std::uint16_t kOperation = answer_of(CtrlOperation::log_level);
   static constexpr const char* kName = "answer to LOG_LEVEL";
   std::string before;
   void write(bitestream::Writer& writer) const;

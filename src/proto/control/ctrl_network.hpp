@@ -18,7 +18,7 @@ namespace gimnet::proto::ctrl {
 // hub ids
 
 struct Hubs {
-  static constexpr std::uint16_t kOperation = request_of(Operation::hubs);
+  static constexpr std::uint16_t kOperation = request_of(CtrlOperation::hubs);
   static constexpr const char* kName = "HUBS";
   HubId after;  ///< continue after this one; 0: from the start
   std::uint32_t records_max = kPageRecordsDefault;
@@ -53,7 +53,7 @@ struct HubRecord {
 [[nodiscard]] std::size_t page_bytes_max(const HubRecord& record);
 
 struct HubsAnswer {
-  static constexpr std::uint16_t kOperation = answer_of(Operation::hubs);
+  static constexpr std::uint16_t kOperation = answer_of(CtrlOperation::hubs);
   static constexpr const char* kName = "answer to HUBS";
   std::vector<HubRecord> hubs;
   bool more = false;
@@ -65,7 +65,7 @@ struct HubsAnswer {
 // LINKS: the links of this hub, in pages
 
 struct Links {
-  static constexpr std::uint16_t kOperation = request_of(Operation::links);
+  static constexpr std::uint16_t kOperation = request_of(CtrlOperation::links);
   static constexpr const char* kName = "LINKS";
   std::uint32_t skip = 0;  ///< records of earlier pages
   std::uint32_t records_max = kPageRecordsDefault;
@@ -114,7 +114,7 @@ struct LinkRecord {
 [[nodiscard]] std::size_t page_bytes_max(const LinkRecord& record);
 
 struct LinksAnswer {
-  static constexpr std::uint16_t kOperation = answer_of(Operation::links);
+  static constexpr std::uint16_t kOperation = answer_of(CtrlOperation::links);
   static constexpr const char* kName = "answer to LINKS";
   std::vector<LinkRecord> links;
   bool more = false;
@@ -128,7 +128,7 @@ struct LinksAnswer {
 // LINK_ADD: dials a further link until the hub ends
 
 struct LinkAdd {
-  static constexpr std::uint16_t kOperation = request_of(Operation::link_add);
+  static constexpr std::uint16_t kOperation = request_of(CtrlOperation::link_add);
   static constexpr const char* kName = "LINK_ADD";
   std::string url;
   std::string name;        ///< "": the URL
@@ -142,7 +142,7 @@ struct LinkAdd {
 // LINK_REMOVE: ends a link and dials it no more
 
 struct LinkRemove {
-  static constexpr std::uint16_t kOperation = request_of(Operation::link_remove);
+  static constexpr std::uint16_t kOperation = request_of(CtrlOperation::link_remove);
   static constexpr const char* kName = "LINK_REMOVE";
   std::string name;
   void write(bitestream::Writer& writer) const;
@@ -153,7 +153,7 @@ struct LinkRemove {
 // LINK_COST: fixes the cost of a dialled link
 
 struct LinkCost {
-  static constexpr std::uint16_t kOperation = request_of(Operation::link_cost);
+  static constexpr std::uint16_t kOperation = request_of(CtrlOperation::link_cost);
   static constexpr const char* kName = "LINK_COST";
   std::string name;
   std::uint16_t cost = 0;  ///< 0: measured

@@ -55,34 +55,34 @@ void write_page_request(bitestream::Writer& writer, const std::string& pattern, 
 }  // namespace
 
 const char* operation_name(std::uint16_t operation) {
-  switch (static_cast<Operation>(operation)) {
-    case Operation::register_name:
+  switch (static_cast<NsOperation>(operation)) {
+    case NsOperation::register_name:
       return "register";
-    case Operation::unregister_name:
+    case NsOperation::unregister_name:
       return "unregister";
-    case Operation::resolve:
+    case NsOperation::resolve:
       return "resolve";
-    case Operation::reverse:
+    case NsOperation::reverse:
       return "reverse";
-    case Operation::list:
+    case NsOperation::list:
       return "list";
-    case Operation::advertise:
+    case NsOperation::advertise:
       return "advertise";
-    case Operation::withdraw:
+    case NsOperation::withdraw:
       return "withdraw";
-    case Operation::services:
+    case NsOperation::services:
       return "services";
-    case Operation::subscribe:
+    case NsOperation::subscribe:
       return "subscribe";
-    case Operation::unsubscribe:
+    case NsOperation::unsubscribe:
       return "unsubscribe";
-    case Operation::let_go:
+    case NsOperation::let_go:
       return "let_go";
-    case Operation::watch:
+    case NsOperation::watch:
       return "watch";
-    case Operation::unwatch:
+    case NsOperation::unwatch:
       return "unwatch";
-    case Operation::watch_taken:
+    case NsOperation::watch_taken:
       return "watch_taken";
     default:
       return nullptr;

@@ -15,7 +15,7 @@
 
 namespace gimnet::proto::ns {
 
-enum class Operation : std::uint16_t {
+enum class NsOperation : std::uint16_t {
   register_name = 1,
   unregister_name = 2,
   resolve = 3,
@@ -36,10 +36,10 @@ enum class Operation : std::uint16_t {
   watch_events = 37,
 };
 
-[[nodiscard]] constexpr std::uint16_t request_of(Operation operation) {
+[[nodiscard]] constexpr std::uint16_t request_of(NsOperation operation) {
   return static_cast<std::uint16_t>(operation);
 }
-[[nodiscard]] constexpr std::uint16_t answer_of(Operation operation) {
+[[nodiscard]] constexpr std::uint16_t answer_of(NsOperation operation) {
   return static_cast<std::uint16_t>(request_of(operation) | kAnswerBit);
 }
 
@@ -58,7 +58,7 @@ inline constexpr std::uint32_t kPageRecordsDefault = 256;
 // RESOLVE: which node has that name?
 
 struct Resolve {
-  static constexpr std::uint16_t kOperation = request_of(Operation::resolve);
+  static constexpr std::uint16_t kOperation = request_of(NsOperation::resolve);
   static constexpr const char* kName = "RESOLVE";
   std::string name;
   void write(bitestream::Writer& writer) const;
@@ -74,7 +74,7 @@ enum class NameStanding : std::uint8_t {
 };
 
 struct ResolveAnswer {
-  static constexpr std::uint16_t kOperation = answer_of(Operation::resolve);
+  static constexpr std::uint16_t kOperation = answer_of(NsOperation::resolve);
   static constexpr const char* kName = "answer to RESOLVE";
   NodeId node;
   NameStanding standing = NameStanding::held;  ///< as sent: may be a value that is not listed
@@ -87,7 +87,7 @@ struct ResolveAnswer {
 // REVERSE: which name has that node?
 
 struct Reverse {
-  static constexpr std::uint16_t kOperation = request_of(Operation::reverse);
+  static constexpr std::uint16_t kOperation = request_of(NsOperation::reverse);
   static constexpr const char* kName = "REVERSE";
   NodeId node;
   void write(bitestream::Writer& writer) const;
@@ -96,7 +96,7 @@ struct Reverse {
 };
 
 struct ReverseAnswer {
-  static constexpr std::uint16_t kOperation = answer_of(Operation::reverse);
+  static constexpr std::uint16_t kOperation = answer_of(NsOperation::reverse);
   static constexpr const char* kName = "answer to REVERSE";
   std::string name;  ///< empty: the node has none
   NodeId node;
@@ -108,7 +108,7 @@ struct ReverseAnswer {
 // LIST: nodes by pattern, in pages of ascending ids
 
 struct List {
-  static constexpr std::uint16_t kOperation = request_of(Operation::list);
+  static constexpr std::uint16_t kOperation = request_of(NsOperation::list);
   static constexpr const char* kName = "LIST";
   std::string pattern;  ///< empty: all
   NodeId after;         ///< continue after this one; 0: from the start
@@ -138,7 +138,7 @@ void write_record(bitestream::Writer& writer, const NodeRecord& record);
 [[nodiscard]] NodeRecord read_node_record(Fields& fields);
 
 struct ListAnswer {
-  static constexpr std::uint16_t kOperation = answer_of(Operation::list);
+  static constexpr std::uint16_t kOperation = answer_of(NsOperation::list);
   static constexpr const char* kName = "answer to LIST";
   std::vector<NodeRecord> nodes;  ///< may be none though there are more
   bool more = false;
@@ -151,7 +151,7 @@ struct ListAnswer {
 // ADVERTISE and WITHDRAW: a service of mine
 
 struct Advertise {
-  static constexpr std::uint16_t kOperation = request_of(Operation::advertise);
+  static constexpr std::uint16_t kOperation = request_of(NsOperation::advertise);
   static constexpr const char* kName = "ADVERTISE";
   std::string service;  ///< within the node, without '/'
   std::uint32_t message_type = 0;
@@ -167,7 +167,7 @@ struct Advertise {
 };
 
 struct AdvertiseAnswer {
-  static constexpr std::uint16_t kOperation = answer_of(Operation::advertise);
+  static constexpr std::uint16_t kOperation = answer_of(NsOperation::advertise);
   static constexpr const char* kName = "answer to ADVERTISE";
   GroupId group;
   std::uint32_t subscribers = 0;
@@ -177,7 +177,7 @@ struct AdvertiseAnswer {
 };
 
 struct Withdraw {
-  static constexpr std::uint16_t kOperation = request_of(Operation::withdraw);
+  static constexpr std::uint16_t kOperation = request_of(NsOperation::withdraw);
   static constexpr const char* kName = "WITHDRAW";
   GroupId group;
   void write(bitestream::Writer& writer) const;
@@ -186,7 +186,7 @@ struct Withdraw {
 };
 
 struct WithdrawAnswer {
-  static constexpr std::uint16_t kOperation = answer_of(Operation::withdraw);
+  static constexpr std::uint16_t kOperation = answer_of(NsOperation::withdraw);
   static constexpr const char* kName = "answer to WITHDRAW";
   void write(bitestream::Writer&) const {}
   [[nodiscard]] static WithdrawAnswer read(Fields&) { return {}; }
@@ -196,7 +196,7 @@ struct WithdrawAnswer {
 // SERVICES: services by pattern over their full names, in pages of ascending group ids
 
 struct Services {
-  static constexpr std::uint16_t kOperation = request_of(Operation::services);
+  static constexpr std::uint16_t kOperation = request_of(NsOperation::services);
   static constexpr const char* kName = "SERVICES";
   std::string pattern;  ///< empty: all
   GroupId after;        ///< continue after this one; 0: from the start
@@ -227,7 +227,7 @@ void write_record(bitestream::Writer& writer, const ServiceRecord& record);
 [[nodiscard]] ServiceRecord read_service_record(Fields& fields);
 
 struct ServicesAnswer {
-  static constexpr std::uint16_t kOperation = answer_of(Operation::services);
+  static constexpr std::uint16_t kOperation = answer_of(NsOperation::services);
   static constexpr const char* kName = "answer to SERVICES";
   std::vector<ServiceRecord> services;  ///< may be none though there are more
   bool more = false;
@@ -240,7 +240,7 @@ struct ServicesAnswer {
 // SUBSCRIBE and UNSUBSCRIBE: a service by its full name, which need not exist yet
 
 struct Subscribe {
-  static constexpr std::uint16_t kOperation = request_of(Operation::subscribe);
+  static constexpr std::uint16_t kOperation = request_of(NsOperation::subscribe);
   static constexpr const char* kName = "SUBSCRIBE";
   std::string name;
   std::uint32_t window =
@@ -273,7 +273,7 @@ struct ServiceState {
 };
 
 struct SubscribeAnswer : ServiceState {
-  static constexpr std::uint16_t kOperation = answer_of(Operation::subscribe);
+  static constexpr std::uint16_t kOperation = answer_of(NsOperation::subscribe);
   static constexpr const char* kName = "answer to SUBSCRIBE";
   std::uint8_t number = 0;  ///< as asked
   void write(bitestream::Writer& writer) const;
@@ -282,7 +282,7 @@ struct SubscribeAnswer : ServiceState {
 };
 
 struct Unsubscribe {
-  static constexpr std::uint16_t kOperation = request_of(Operation::unsubscribe);
+  static constexpr std::uint16_t kOperation = request_of(NsOperation::unsubscribe);
   static constexpr const char* kName = "UNSUBSCRIBE";
   std::string name;
   void write(bitestream::Writer& writer) const;
@@ -291,7 +291,7 @@ struct Unsubscribe {
 };
 
 struct UnsubscribeAnswer {
-  static constexpr std::uint16_t kOperation = answer_of(Operation::unsubscribe);
+  static constexpr std::uint16_t kOperation = answer_of(NsOperation::unsubscribe);
   static constexpr const char* kName = "answer to UNSUBSCRIBE";
   void write(bitestream::Writer&) const {}
   [[nodiscard]] static UnsubscribeAnswer read(Fields&) { return {}; }
@@ -303,7 +303,7 @@ struct UnsubscribeAnswer {
 /// To subscribers, before the first frame under another group id, and whenever the provider or the
 /// terms changed: the state of that moment.
 struct ServiceMoved : ServiceState {
-  static constexpr std::uint16_t kOperation = request_of(Operation::service_moved);
+  static constexpr std::uint16_t kOperation = request_of(NsOperation::service_moved);
   static constexpr const char* kName = "SERVICE_MOVED";
   std::string name;  ///< full
   void write(bitestream::Writer& writer) const;
@@ -313,7 +313,7 @@ struct ServiceMoved : ServiceState {
 
 /// Tells a provider the present number of its service's subscribers.
 struct Subscribers {
-  static constexpr std::uint16_t kOperation = request_of(Operation::subscribers);
+  static constexpr std::uint16_t kOperation = request_of(NsOperation::subscribers);
   static constexpr const char* kName = "SUBSCRIBERS";
   GroupId group;
   std::uint32_t subscribers = 0;

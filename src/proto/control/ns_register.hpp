@@ -15,7 +15,7 @@ namespace gimnet::proto::ns {
 // REGISTER: take that name, in place of the one that this node has
 
 struct RegisterName {
-  static constexpr std::uint16_t kOperation = request_of(Operation::register_name);
+  static constexpr std::uint16_t kOperation = request_of(NsOperation::register_name);
   static constexpr const char* kName = "REGISTER";
   std::string name;
   void write(bitestream::Writer& writer) const;
@@ -24,7 +24,7 @@ struct RegisterName {
 };
 
 struct RegisterNameAnswer {
-  static constexpr std::uint16_t kOperation = answer_of(Operation::register_name);
+  static constexpr std::uint16_t kOperation = answer_of(NsOperation::register_name);
   static constexpr const char* kName = "answer to REGISTER";
   std::string name;              ///< as registered
   std::vector<std::byte> token;  ///< of the session, in place of the one of WELCOME
@@ -36,7 +36,7 @@ struct RegisterNameAnswer {
 // UNREGISTER: give the own name back, go on without one
 
 struct UnregisterName {
-  static constexpr std::uint16_t kOperation = request_of(Operation::unregister_name);
+  static constexpr std::uint16_t kOperation = request_of(NsOperation::unregister_name);
   static constexpr const char* kName = "UNREGISTER";
   void write(bitestream::Writer&) const {}
   [[nodiscard]] static UnregisterName read(Fields&) { return {}; }
@@ -44,7 +44,7 @@ struct UnregisterName {
 };
 
 struct UnregisterNameAnswer {
-  static constexpr std::uint16_t kOperation = answer_of(Operation::unregister_name);
+  static constexpr std::uint16_t kOperation = answer_of(NsOperation::unregister_name);
   static constexpr const char* kName = "answer to UNREGISTER";
   std::vector<std::byte> token;  ///< of the session, in place of the one before
   void write(bitestream::Writer& writer) const;
@@ -55,7 +55,7 @@ struct UnregisterNameAnswer {
 // LET_GO: from hub to hub: end the session of that token, whose node is here now
 
 struct LetGo {
-  static constexpr std::uint16_t kOperation = request_of(Operation::let_go);
+  static constexpr std::uint16_t kOperation = request_of(NsOperation::let_go);
   static constexpr const char* kName = "LET_GO";
   std::string name;                   ///< that the node asks for; "": none
   std::vector<std::byte> token;       ///< as the node showed it
@@ -66,7 +66,7 @@ struct LetGo {
 };
 
 struct LetGoAnswer {
-  static constexpr std::uint16_t kOperation = answer_of(Operation::let_go);
+  static constexpr std::uint16_t kOperation = answer_of(NsOperation::let_go);
   static constexpr const char* kName = "answer to LET_GO";
   void write(bitestream::Writer&) const {}
   [[nodiscard]] static LetGoAnswer read(Fields&) { return {}; }
@@ -78,7 +78,7 @@ struct LetGoAnswer {
 /// The name went to a node of another hub, which has the better claim: the node goes on without
 /// one. Or it is the full name of a service of this node: that has ended.
 struct NameLost {
-  static constexpr std::uint16_t kOperation = request_of(Operation::name_lost);
+  static constexpr std::uint16_t kOperation = request_of(NsOperation::name_lost);
   static constexpr const char* kName = "NAME_LOST";
   std::string name;
   NodeId holder;         ///< who has it now

@@ -18,7 +18,7 @@ enum WatchSubjects : std::uint8_t { kWatchNodes = 1, kWatchServices = 2, kWatchA
 // from the start.
 
 struct Watch {
-  static constexpr std::uint16_t kOperation = request_of(Operation::watch);
+  static constexpr std::uint16_t kOperation = request_of(NsOperation::watch);
   static constexpr const char* kName = "WATCH";
   std::uint32_t watch = 0;  ///< a number that the node chooses, not 0
   std::string pattern;      ///< empty: all
@@ -32,7 +32,7 @@ struct Watch {
 };
 
 struct WatchAnswer {
-  static constexpr std::uint16_t kOperation = answer_of(Operation::watch);
+  static constexpr std::uint16_t kOperation = answer_of(NsOperation::watch);
   static constexpr const char* kName = "answer to WATCH";
   bool snapshot = false;  ///< one follows; false: the changes go on where the node said
   void write(bitestream::Writer& writer) const;
@@ -41,7 +41,7 @@ struct WatchAnswer {
 };
 
 struct Unwatch {
-  static constexpr std::uint16_t kOperation = request_of(Operation::unwatch);
+  static constexpr std::uint16_t kOperation = request_of(NsOperation::unwatch);
   static constexpr const char* kName = "UNWATCH";
   std::uint32_t watch = 0;
   void write(bitestream::Writer& writer) const;
@@ -50,7 +50,7 @@ struct Unwatch {
 };
 
 struct UnwatchAnswer {
-  static constexpr std::uint16_t kOperation = answer_of(Operation::unwatch);
+  static constexpr std::uint16_t kOperation = answer_of(NsOperation::unwatch);
   static constexpr const char* kName = "answer to UNWATCH";
   void write(bitestream::Writer&) const {}
   [[nodiscard]] static UnwatchAnswer read(Fields&) { return {}; }
@@ -60,7 +60,7 @@ struct UnwatchAnswer {
 // WATCH_TAKEN: so many WATCH_EVENTS of that watch were taken; the hub may send as many more.
 
 struct WatchTaken {
-  static constexpr std::uint16_t kOperation = request_of(Operation::watch_taken);
+  static constexpr std::uint16_t kOperation = request_of(NsOperation::watch_taken);
   static constexpr const char* kName = "WATCH_TAKEN";
   std::uint32_t watch = 0;
   std::uint32_t frames = 1;
@@ -70,7 +70,7 @@ struct WatchTaken {
 };
 
 struct WatchTakenAnswer {
-  static constexpr std::uint16_t kOperation = answer_of(Operation::watch_taken);
+  static constexpr std::uint16_t kOperation = answer_of(NsOperation::watch_taken);
   static constexpr const char* kName = "answer to WATCH_TAKEN";
   void write(bitestream::Writer&) const {}
   [[nodiscard]] static WatchTakenAnswer read(Fields&) { return {}; }
@@ -107,7 +107,7 @@ void write_change(bitestream::Writer& writer, const Change& change);
 
 /// Follows the one before it without a gap if `after` is that one's `version`.
 struct WatchEvents {
-  static constexpr std::uint16_t kOperation = request_of(Operation::watch_events);
+  static constexpr std::uint16_t kOperation = request_of(NsOperation::watch_events);
   static constexpr const char* kName = "WATCH_EVENTS";
   std::uint32_t watch = 0;
   HubId hub;                  ///< whose nodes and services these are

@@ -14,7 +14,7 @@
 
 namespace gimnet::proto::route {
 
-enum class Operation : std::uint16_t {
+enum class RouteOperation : std::uint16_t {
   record = 1,
   records_end = 2,
   keep_alive = 3,
@@ -49,7 +49,7 @@ struct Neighbour {
 /// One part of a hub's record: the hub says of itself which neighbours it has. Other hubs pass the
 /// bytes on as they came, since a later version may have more keys.
 struct RecordPart {
-  static constexpr std::uint16_t kOperation = static_cast<std::uint16_t>(Operation::record);
+  static constexpr std::uint16_t kOperation = static_cast<std::uint16_t>(RouteOperation::record);
   static constexpr const char* kName = "RECORD";
 
   HubKey hub;
@@ -74,7 +74,8 @@ struct RecordPart {
 
 /// All records that this side had when the connection began are sent.
 struct RecordsEnd {
-  static constexpr std::uint16_t kOperation = static_cast<std::uint16_t>(Operation::records_end);
+  static constexpr std::uint16_t kOperation =
+      static_cast<std::uint16_t>(RouteOperation::records_end);
   static constexpr const char* kName = "RECORDS_END";
   void write(bitestream::Writer&) const {}
   [[nodiscard]] static RecordsEnd read(Fields&) { return {}; }
@@ -83,7 +84,8 @@ struct RecordsEnd {
 
 /// The keep-alive of a link. Times are in ns since 1970, by the clock of the hub that says them.
 struct KeepAlive {
-  static constexpr std::uint16_t kOperation = static_cast<std::uint16_t>(Operation::keep_alive);
+  static constexpr std::uint16_t kOperation =
+      static_cast<std::uint16_t>(RouteOperation::keep_alive);
   static constexpr const char* kName = "KEEP_ALIVE";
   std::int64_t sent_ns = 0;
   std::int64_t heard_sent_ns = 0;  ///< `sent_ns` of the last keep-alive heard; 0: none was heard

@@ -25,7 +25,7 @@ struct JoinTerms {
 
 /// The neighbour is to send the messages of these groups over this link.
 struct Join {
-  static constexpr std::uint16_t kOperation = static_cast<std::uint16_t>(Operation::join);
+  static constexpr std::uint16_t kOperation = static_cast<std::uint16_t>(RouteOperation::join);
   static constexpr const char* kName = "JOIN";
   struct Entry {
     GroupId group;
@@ -41,7 +41,7 @@ struct Join {
 
 /// It is to send their messages no more.
 struct Leave {
-  static constexpr std::uint16_t kOperation = static_cast<std::uint16_t>(Operation::leave);
+  static constexpr std::uint16_t kOperation = static_cast<std::uint16_t>(RouteOperation::leave);
   static constexpr const char* kName = "LEAVE";
   std::vector<GroupId> groups;  ///< 1 to kGroupsMax
   void write(bitestream::Writer& writer) const;
@@ -51,7 +51,7 @@ struct Leave {
 
 /// All groups that the sender had joined when the connection began have been named.
 struct JoinsEnd {
-  static constexpr std::uint16_t kOperation = static_cast<std::uint16_t>(Operation::joins_end);
+  static constexpr std::uint16_t kOperation = static_cast<std::uint16_t>(RouteOperation::joins_end);
   static constexpr const char* kName = "JOINS_END";
   void write(bitestream::Writer&) const {}
   [[nodiscard]] static JoinsEnd read(Fields&) { return {}; }
@@ -60,7 +60,7 @@ struct JoinsEnd {
 
 /// From now on the messages of these groups come over this link: the answer to JOIN.
 struct Joined {
-  static constexpr std::uint16_t kOperation = static_cast<std::uint16_t>(Operation::joined);
+  static constexpr std::uint16_t kOperation = static_cast<std::uint16_t>(RouteOperation::joined);
   static constexpr const char* kName = "JOINED";
   std::vector<GroupId> groups;  ///< 1 to kGroupsMax
   void write(bitestream::Writer& writer) const;

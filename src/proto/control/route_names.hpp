@@ -61,7 +61,8 @@ struct NameRecord {
 /// For each hub: up to which version the sender's copy of its names is complete. It asks for what
 /// is newer.
 struct NamesKnown {
-  static constexpr std::uint16_t kOperation = static_cast<std::uint16_t>(Operation::names_known);
+  static constexpr std::uint16_t kOperation =
+      static_cast<std::uint16_t>(RouteOperation::names_known);
   static constexpr const char* kName = "NAMES_KNOWN";
   struct Entry {
     HubId hub;
@@ -78,7 +79,7 @@ struct NamesKnown {
 
 /// All names of one hub that changed last in (after, version], as they are now.
 struct Names {
-  static constexpr std::uint16_t kOperation = static_cast<std::uint16_t>(Operation::names);
+  static constexpr std::uint16_t kOperation = static_cast<std::uint16_t>(RouteOperation::names);
   static constexpr const char* kName = "NAMES";
   HubId hub;
   HubInstance instance;
@@ -93,7 +94,8 @@ struct Names {
 
 /// So many NAMES were taken: as many more may come.
 struct NamesTaken {
-  static constexpr std::uint16_t kOperation = static_cast<std::uint16_t>(Operation::names_taken);
+  static constexpr std::uint16_t kOperation =
+      static_cast<std::uint16_t>(RouteOperation::names_taken);
   static constexpr const char* kName = "NAMES_TAKEN";
   std::uint32_t messages = 1;
   void write(bitestream::Writer& writer) const;

@@ -13,19 +13,19 @@ constexpr std::size_t kPingSize = 16;
 constexpr std::size_t kPongSize = 24;
 
 /// 0: not an operation.
-constexpr std::size_t size_of(Operation operation) {
+constexpr std::size_t size_of(FlowOperation operation) {
   switch (operation) {
-    case Operation::ping:
+    case FlowOperation::ping:
       return kPingSize;
-    case Operation::pong:
+    case FlowOperation::pong:
       return kPongSize;
-    case Operation::credit:
-    case Operation::confirm:
-    case Operation::skip:
-    case Operation::dropped:
+    case FlowOperation::credit:
+    case FlowOperation::confirm:
+    case FlowOperation::skip:
+    case FlowOperation::dropped:
       return kCountSize;
-    case Operation::pause:
-    case Operation::resume:
+    case FlowOperation::pause:
+    case FlowOperation::resume:
       return kTargetSize;
   }
   return 0;
@@ -50,7 +50,7 @@ DropReason known_reason(std::byte reason) {
 }
 
 /// The operation's byte and the zeros behind it.
-void store_operation(std::byte* bytes, Operation operation, std::size_t size) {
+void store_operation(std::byte* bytes, FlowOperation operation, std::size_t size) {
   std::memset(bytes, 0, size);
   bytes[0] = static_cast<std::byte>(operation);
 }
@@ -59,48 +59,48 @@ struct PayloadEncoder {
   std::byte* bytes;
 
   std::size_t operator()(const Ping& ping) const {
-    store_operation(bytes, Operation::ping, kPingSize);
+    store_operation(bytes, FlowOperation::ping, kPingSize);
     store_le(bytes + 4, ping.sequence);
     store_le(bytes + 8, ping.sent_ns);
     return kPingSize;
   }
   std::size_t operator()(const Pong& pong) const {
-    store_operation(bytes, Operation::pong, kPongSize);
+    store_operation(bytes, FlowOperation::pong, kPongSize);
     store_le(bytes + 4, pong.sequence);
     store_le(bytes + 8, pong.sent_ns);
     store_le(bytes + 16, pong.now_ns);
     return kPongSize;
   }
   std::size_t operator()(const Credit& credit) const {
-    store_operation(bytes, Operation::credit, kCountSize);
+    store_operation(bytes, FlowOperation::credit, kCountSize);
     bytes[1] = static_cast<std::byte>(credit.number);
     store_le(bytes + 4, credit.group.value());
     store_le(bytes + 8, credit.taken);
     return kCountSize;
   }
   std::size_t operator()(const Pause& pause) const {
-    store_operation(bytes, Operation::pause, kTargetSize);
+    store_operation(bytes, FlowOperation::pause, kTargetSize);
     store_target(bytes, pause.target);
     return kTargetSize;
   }
   std::size_t operator()(const Resume& resume) const {
-    store_operation(bytes, Operation::resume, kTargetSize);
+    store_operation(bytes, FlowOperation::resume, kTargetSize);
     store_target(bytes, resume.target);
     return kTargetSize;
   }
   std::size_t operator()(const Confirm& confirm) const {
-    store_operation(bytes, Operation::confirm, kCountSize);
+    store_operation(bytes, FlowOperation::confirm, kCountSize);
     store_le(bytes + 8, confirm.count);
     return kCountSize;
   }
   std::size_t operator()(const Skip& skip) const {
-    store_operation(bytes, Operation::skip, kCountSize);
+    store_operation(bytes, FlowOperation::skip, kCountSize);
     bytes[1] = static_cast<std::byte>(skip.reason);
     store_le(bytes + 8, skip.count);
     return kCountSize;
   }
   std::size_t operator()(const Dropped& dropped) const {
-    store_operation(bytes, Operation::dropped, kCountSize);
+    store_operation(bytes, FlowOperation::dropped, kCountSize);
     bytes[1] = static_cast<std::byte>(dropped.reason);
     store_le(bytes + 4, dropped.source.value());
     store_le(bytes + 8, dropped.count);
@@ -112,30 +112,30 @@ struct PayloadEncoder {
 
 std::optional<Message> decode(std::span<const std::byte> payload) {
   if (payload.empty()) return std::nullopt;
-  const auto operation = static_cast<Operation>(payload[0]);
+  const auto operation = static_cast<FlowOperation>(payload[0]);
   const std::size_t size = size_of(operation);
   if (size == 0 || payload.size() < size) return std::nullopt;
   const std::byte* bytes = payload.data();
   switch (operation) {
-    case Operation::ping:
+    case FlowOperation::ping:
       return Ping{load_le<std::uint32_t>(bytes + 4), load_le<std::int64_t>(bytes + 8)};
-    case Operation::pong:
+    case FlowOperation::pong:
       return Pong{load_le<std::uint32_t>(bytes + 4), load_le<std::int64_t>(bytes + 8),
                   load_le<std::int64_t>(bytes + 16)};
-    case Operation::credit:
+    case FlowOperation::credit:
       return Credit{GroupId{load_le<std::uint32_t>(bytes + 4)}, load_le<std::uint64_t>(bytes + 8),
                     static_cast<std::uint8_t>(bytes[1])};
-    case Operation::pause:
+    case FlowOperation::pause:
       if (const auto target = load_target(bytes)) return Pause{*target};
       return std::nullopt;
-    case Operation::resume:
+    case FlowOperation::resume:
       if (const auto target = load_target(bytes)) return Resume{*target};
       return std::nullopt;
-    case Operation::confirm:
+    case FlowOperation::confirm:
       return Confirm{load_le<std::uint64_t>(bytes + 8)};
-    case Operation::skip:
+    case FlowOperation::skip:
       return Skip{known_reason(bytes[1]), load_le<std::uint64_t>(bytes + 8)};
-    case Operation::dropped:
+    case FlowOperation::dropped:
       return Dropped{known_reason(bytes[1]), NodeId{load_le<std::uint32_t>(bytes + 4)},
                      load_le<std::uint64_t>(bytes + 8)};
   }

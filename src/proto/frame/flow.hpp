@@ -14,7 +14,7 @@
 
 namespace gimnet::proto::flow {
 
-enum class Operation : std::uint8_t {
+enum class FlowOperation : std::uint8_t {
   ping = 1,
   pong = 2,
   credit = 3,

@@ -7,7 +7,7 @@
 namespace gimnet::proto::gimi {
 
 MessageHeader load_message_header(const std::byte* bytes) {
-  return {load_le<std::uint32_t>(bytes + 4), static_cast<Operation>(bytes[8]),
+  return {load_le<std::uint32_t>(bytes + 4), static_cast<MessageOperation>(bytes[8]),
           static_cast<std::uint8_t>(bytes[9]), load_le<std::uint16_t>(bytes + 10),
           load_le<std::uint32_t>(bytes)};
 }
@@ -24,7 +24,7 @@ std::optional<MessageView> parse_message(std::span<const std::byte> payload) {
   if (payload.size() < kMessageHeaderSize) return std::nullopt;
   MessageView view;
   view.header = load_message_header(payload.data());
-  if (view.header.operation > Operation::pong) return std::nullopt;
+  if (view.header.operation > MessageOperation::pong) return std::nullopt;
   const auto rest = payload.subspan(kMessageHeaderSize);
   if (view.header.extension_bytes > rest.size()) return std::nullopt;
   view.extension = rest.first(view.header.extension_bytes);
@@ -41,7 +41,7 @@ std::uint32_t application_bytes(bool keyed, std::span<const std::byte> start, st
   const MessageHeader header = load_message_header(start.data());
   const std::uint32_t prefix =
       static_cast<std::uint32_t>(kMessageHeaderSize) + header.extension_bytes;
-  return header.operation <= Operation::pong && prefix <= size ? size - prefix : size;
+  return header.operation <= MessageOperation::pong && prefix <= size ? size - prefix : size;
 }
 
 std::size_t write_message_prefix(MessageHeader header, std::optional<std::int64_t> timestamp_ns,
@@ -69,9 +69,9 @@ std::size_t encode_ack(const Ack& ack, std::span<std::byte, kAckSizeMax> data) {
   return kAckSizeMax;
 }
 
-std::optional<Failure> decode_failure(std::span<const std::byte> data) {
+std::optional<ErrorData> decode_error(std::span<const std::byte> data) {
   if (data.size() < kErrorStatusSize) return std::nullopt;
-  Failure failure;
+  ErrorData failure;
   failure.status = load_le<std::uint16_t>(data.data());
   data = data.subspan(kErrorStatusSize);
   if ((failure.status & kErrorGroupBit) != 0) {
@@ -84,7 +84,7 @@ std::optional<Failure> decode_failure(std::span<const std::byte> data) {
   return failure;
 }
 
-std::vector<std::byte> encode_failure(const Failure& failure) {
+std::vector<std::byte> encode_error(const ErrorData& failure) {
   const bool to_service = failure.group != 0;
   const std::size_t head = kErrorStatusSize + (to_service ? sizeof failure.group : 0);
   std::vector<std::byte> data(head + failure.sentence.size());

@@ -33,7 +33,7 @@ struct StreamKey {
   friend constexpr bool operator==(const StreamKey&, const StreamKey&) = default;
 };
 
-enum class Operation : std::uint8_t {
+enum class MessageOperation : std::uint8_t {
   data = 0,
   ack = 1,
   request = 2,
@@ -49,7 +49,7 @@ inline constexpr std::uint8_t kFlagTimestamp = 0x02;
 /// On the wire: epoch, sequence, operation, flags, extension_bytes.
 struct MessageHeader {
   std::uint32_t sequence = 0;
-  Operation operation = Operation::data;
+  MessageOperation operation = MessageOperation::data;
   std::uint8_t flags = 0;
   std::uint16_t extension_bytes = 0;
   /// Of the sending stream; of an answer that of the message that it answers.
@@ -100,7 +100,7 @@ struct Ack {
 std::size_t encode_ack(const Ack& ack, std::span<std::byte, kAckSizeMax> data);
 
 /// Data of ERROR. Valid until: its bytes change.
-struct Failure {
+struct ErrorData {
   std::uint16_t status = 0;
   std::string_view sentence;
   std::uint32_t group =
@@ -109,7 +109,7 @@ struct Failure {
 /// In the status as written: a group id follows it.
 inline constexpr std::uint16_t kErrorGroupBit = 0x8000;
 /// Nothing: too short.
-[[nodiscard]] std::optional<Failure> decode_failure(std::span<const std::byte> data);
-[[nodiscard]] std::vector<std::byte> encode_failure(const Failure& failure);
+[[nodiscard]] std::optional<ErrorData> decode_error(std::span<const std::byte> data);
+[[nodiscard]] std::vector<std::byte> encode_error(const ErrorData& failure);
 
 }  // namespace gimnet::proto::gimi

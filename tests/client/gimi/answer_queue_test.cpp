@@ -15,14 +15,14 @@ using proto::gimi::kFlagAgain;
 using proto::gimi::kFlagRepeat;
 using proto::gimi::kNoDeadline;
 using proto::gimi::MessageHeader;
-using proto::gimi::Operation;
+using proto::gimi::MessageOperation;
 
 class AnswerQueueTest : public testing::Test {
  protected:
   /// Was it kept?
   bool ask(std::uint32_t sequence, std::uint8_t flags = 0, std::uint32_t left_ms = kNoDeadline) {
     Message message = gimnet::test::make_message(data_, sequence);
-    return queue_.on_request({sequence, Operation::request, flags, 0, 7}, message, left_ms);
+    return queue_.on_request({sequence, MessageOperation::request, flags, 0, 7}, message, left_ms);
   }
   static constexpr std::size_t kBytesMax = 1000;
   std::string data_ = "x";

@@ -13,7 +13,7 @@ namespace {
 using test::Conversation;
 using test::kOwnId;
 using test::kPeerId;
-using test::Operation;
+using test::MessageOperation;
 using test::Taken;
 
 class ClerkTest : public Conversation {
@@ -35,7 +35,8 @@ class ClerkTest : public Conversation {
   /// A DATA that asks for an ACK.
   void send_data(std::uint32_t from) {
     std::array<std::byte, proto::gimi::kMessagePrefixMax> prefix;
-    const proto::gimi::MessageHeader header{1, Operation::data, proto::gimi::kFlagAckWanted, 0};
+    const proto::gimi::MessageHeader header{1, MessageOperation::data, proto::gimi::kFlagAckWanted,
+                                            0};
     const std::size_t size = proto::gimi::write_message_prefix(header, std::nullopt, prefix);
     proto::FrameParts parts;
     parts.header.kind = proto::Kind::unicast;
@@ -52,11 +53,11 @@ TEST_F(ClerkTest, LooksAfterStreamsWhileAnAckWaitsForItsWay) {
   send_data(kSlow);
   send_data(kPeerId);
   const Taken ack = next();
-  ASSERT_EQ(ack.header.operation, Operation::ack);
+  ASSERT_EQ(ack.header.operation, MessageOperation::ack);
   ASSERT_EQ(ack.frame.dst, kPeerId) << "the ACK for the other one was tried before";
   stream.send("is not acknowledged").or_throw();
-  EXPECT_EQ(next().header.operation, Operation::data);
-  EXPECT_EQ(next().header.operation, Operation::ping) << "asks for the ACK";
+  EXPECT_EQ(next().header.operation, MessageOperation::data);
+  EXPECT_EQ(next().header.operation, MessageOperation::ping) << "asks for the ACK";
 }
 
 TEST_F(ClerkTest, AnAckThatWaitsForItsWayIsOne) {
@@ -80,7 +81,7 @@ constexpr StreamName kSender{Peer{1}, {2, 3}};
 constexpr std::uint64_t kAll = ~std::uint64_t{0};
 
 proto::gimi::MessageHeader data(std::uint32_t sequence, std::uint32_t epoch = 1) {
-  return {sequence, proto::gimi::Operation::data, 0, 0, epoch};
+  return {sequence, proto::gimi::MessageOperation::data, 0, 0, epoch};
 }
 
 TEST(AckBook, KnowsNothingOfAStranger) {

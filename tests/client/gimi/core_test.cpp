@@ -24,7 +24,7 @@ using proto::GoodbyeCode;
 using test::Conversation;
 using test::kKey;
 using test::kPeerId;
-using test::Operation;
+using test::MessageOperation;
 
 /// Dials again after breaks, as programs do.
 class Dismissed : public Conversation, public testing::WithParamInterface<GoodbyeCode> {
@@ -46,7 +46,7 @@ class Lost : public Conversation {
   void send_to_group(std::uint32_t group) {
     std::array<std::byte, proto::gimi::kMessagePrefixMax> prefix;
     const std::size_t size =
-        proto::gimi::write_message_prefix({1, Operation::data, 0, 0}, std::nullopt, prefix);
+        proto::gimi::write_message_prefix({1, MessageOperation::data, 0, 0}, std::nullopt, prefix);
     proto::FrameParts parts;
     parts.header.kind = proto::Kind::group;
     parts.header.dst = group;
@@ -57,7 +57,7 @@ class Lost : public Conversation {
   /// Everything that was sent before is taken too.
   void take_one() {
     const std::string text = "x";
-    answer({1, Operation::data, 0, 0}, std::as_bytes(std::span(text)));
+    answer({1, MessageOperation::data, 0, 0}, std::as_bytes(std::span(text)));
     ASSERT_TRUE(node_->receive());
   }
   /// The first piece of a large message to this node.
@@ -105,7 +105,8 @@ TEST_P(Dismissed, WhatCameBeforeStillComes) {
   const Queue queue = node_->queue(kKey, {2, AtFullQueue::stop_reading});
   const std::string text = "x";
   for (int i = 1; i <= kMessages; ++i) {
-    answer({static_cast<std::uint32_t>(i), Operation::data, 0, 0}, std::as_bytes(std::span(text)));
+    answer({static_cast<std::uint32_t>(i), MessageOperation::data, 0, 0},
+           std::as_bytes(std::span(text)));
   }
   hub_.goodbye(GetParam(), "in the way");
   for (std::uint32_t i = 1; i <= kMessages; ++i) ASSERT_EQ(queue.receive(kForever)->sequence(), i);
@@ -158,7 +159,7 @@ TEST_F(Reconnected, AClosedNodeTellsHowItStoodThen) {
 TEST_F(Reconnected, MessagesTellOverWhichConnectionTheyCame) {
   const std::string text = "x";
   for (std::uint32_t connection = 0; connection < 3; ++connection) {
-    answer({1, Operation::data, 0, 0}, std::as_bytes(std::span(text)));
+    answer({1, MessageOperation::data, 0, 0}, std::as_bytes(std::span(text)));
     const auto message = node_->receive();
     ASSERT_TRUE(message);
     EXPECT_EQ(message->reconnects(), connection);
@@ -174,7 +175,7 @@ TEST_F(Lost, MessagesAreCountedByWhy) {
   begin_message(2, 20'000);
   begin_message(3, 200u << 20);
   const std::string text = "x";
-  answer({1, Operation::data, 0, 0}, std::as_bytes(std::span(text)));
+  answer({1, MessageOperation::data, 0, 0}, std::as_bytes(std::span(text)));
   ASSERT_TRUE(node_->receive());
   EXPECT_EQ(node_->lost().incomplete, 2u) << "each was followed by something else";
   EXPECT_EQ(node_->lost().too_large, 1u);
@@ -188,7 +189,7 @@ TEST_F(Lost, FramesOfOtherNodesThatCannotBeReadAreCounted) {
   taken.header.dst = nif::test::kOwnId;
   hub_.send(taken, std::string(proto::kTakenSize - 1, 'x'));
   const std::string text = "x";
-  answer({1, Operation::data, 0, 0}, std::as_bytes(std::span(text)));
+  answer({1, MessageOperation::data, 0, 0}, std::as_bytes(std::span(text)));
   ASSERT_TRUE(node_->receive());
   EXPECT_EQ(node_->lost().unreadable, 1u);
   EXPECT_EQ(node_->lost().all(), 1u);
@@ -200,7 +201,7 @@ TEST_F(Lost, FramesThatTheHubDroppedAreCountedWithWhoFilledTheQueue) {
   hub_.send(proto::flow::Dropped{proto::DropReason::queue_full, NodeId{9}, 5});
   hub_.send(proto::flow::Dropped{proto::DropReason::over_budget, NodeId{10}, 2});
   const std::string text = "x";
-  answer({1, Operation::data, 0, 0}, std::as_bytes(std::span(text)));
+  answer({1, MessageOperation::data, 0, 0}, std::as_bytes(std::span(text)));
   ASSERT_TRUE(node_->receive());
   EXPECT_EQ(node_->lost().queue_full, 7u);
   EXPECT_EQ(node_->lost().queue_filled_by, Peer{10});
@@ -239,7 +240,7 @@ TEST_F(Lost, MessagesThatTheHubWillNotSendAgainAreCounted) {
   hub_.send(proto::flow::Skip{proto::DropReason::link_lost, 3});
   hub_.send(proto::flow::Skip{proto::DropReason::link_lost, proto::flow::kSkipUnknown});
   const std::string text = "x";
-  answer({1, Operation::data, 0, 0}, std::as_bytes(std::span(text)));
+  answer({1, MessageOperation::data, 0, 0}, std::as_bytes(std::span(text)));
   ASSERT_TRUE(node_->receive());
   EXPECT_EQ(node_->lost().frames_broken_off, 4u) << "at least one, where nobody knows";
 }

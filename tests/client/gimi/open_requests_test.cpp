@@ -200,7 +200,7 @@ TEST_F(OpenRequestsTest, ManyAtOnceGetTheirOwnReplies) {
 
 namespace ns = proto::ns;
 using gimi::test::kPeerId;
-using gimi::test::Operation;
+using gimi::test::MessageOperation;
 using proto::gimi::kFlagAgain;
 
 /// A node that asks, and the hub's end of its connection. Its session is not resumed after a break.
@@ -267,7 +267,7 @@ class RequestsAtAFakeHub : public gimi::test::Conversation {
   gimi::test::Frame next_request() {
     const auto frame = hub_.next_message();
     const gimi::test::Taken taken = taken_of(*frame);
-    EXPECT_EQ(taken.header.operation, Operation::request);
+    EXPECT_EQ(taken.header.operation, MessageOperation::request);
     EXPECT_EQ(taken.frame.dst, kGroup);
     EXPECT_EQ(taken.data.substr(proto::gimi::kRequestPrefix), "1 2");
     sequence_ = taken.header.sequence;
@@ -286,7 +286,8 @@ class RequestsAtAFakeHub : public gimi::test::Conversation {
     hub_ = fake_.admit(nif::test::make_welcome());
   }
   void refuse(proto::gimi::RequestFault fault) {
-    answer({sequence_, Operation::error, 0, 0}, proto::gimi::encode_request_error({fault, 0, ""}));
+    answer({sequence_, MessageOperation::error, 0, 0},
+           proto::gimi::encode_request_error({fault, 0, ""}));
   }
 
   std::uint32_t sequence_ = 0;
@@ -355,11 +356,11 @@ TEST_F(RequestsAtAFakeHub, NobodyIsSaidWhenNoNameIsOnItsWay) {
 
 TEST_F(RequestsAtAFakeHub, RepliesThatNobodyAskedForAreDroppedAndCounted) {
   begin();
-  answer({sequence_ + 1, Operation::reply, 0, 0}, {});
-  answer({sequence_, Operation::reply, 0, 0, epoch_ + 1}, {});
-  answer({sequence_, Operation::reply, 0, 0}, {}, kPeerId + 1);
-  answer({sequence_, Operation::reply, 0, 0}, std::as_bytes(std::span("3", 1)));
-  answer({sequence_, Operation::reply, 0, 0}, {});
+  answer({sequence_ + 1, MessageOperation::reply, 0, 0}, {});
+  answer({sequence_, MessageOperation::reply, 0, 0, epoch_ + 1}, {});
+  answer({sequence_, MessageOperation::reply, 0, 0}, {}, kPeerId + 1);
+  answer({sequence_, MessageOperation::reply, 0, 0}, std::as_bytes(std::span("3", 1)));
+  answer({sequence_, MessageOperation::reply, 0, 0}, {});
   EXPECT_EQ(reply().text(), "3");
   EXPECT_TRUE(gimnet::test::eventually([&] { return node_->dropped() == 4; }));
 }

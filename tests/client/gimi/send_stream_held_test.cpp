@@ -18,7 +18,7 @@ using test::Conversation;
 using test::kAll;
 using test::kKey;
 using test::kPeerId;
-using test::Operation;
+using test::MessageOperation;
 
 /// Two threads on one stream: a message comes to be held while another is still on its way to the
 /// network, because the hub paused its destination.
@@ -39,7 +39,7 @@ class HeldBehindAnother : public Conversation {
   /// What the hub said before was seen to by the node.
   void settle_down() {
     const std::string text = "x";
-    answer({++sequence_, Operation::data, 0, 0}, std::as_bytes(std::span(text)));
+    answer({++sequence_, MessageOperation::data, 0, 0}, std::as_bytes(std::span(text)));
     EXPECT_EQ(node_->receive(kKey, kForever)->sequence(), sequence_);
   }
 

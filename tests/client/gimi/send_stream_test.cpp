@@ -21,7 +21,7 @@ using test::Frame;
 using test::kAll;
 using test::kKey;
 using test::kPeerId;
-using test::Operation;
+using test::MessageOperation;
 using test::Taken;
 
 using SendStreamTest = Conversation;
@@ -49,7 +49,7 @@ TEST_F(SendStreamTest, NeverHasMoreThanItsWindowUnderWay) {
   std::uint32_t acknowledged = 0;
   while (acknowledged < 50 && !HasFailure()) {
     const Taken taken = next();
-    if (taken.header.operation != Operation::data) continue;
+    if (taken.header.operation != MessageOperation::data) continue;
     EXPECT_LE(taken.header.sequence, acknowledged + 5);
     if (taken.header.sequence == acknowledged + 5) acknowledge(acknowledged += 5);
   }
@@ -97,7 +97,7 @@ TEST_F(SendStreamTest, AsksForAMissingAckAndGivesUpWhatThePongDoesNotKnow) {
   next_data();
   next_data();
   const Taken ping = next();
-  EXPECT_EQ(ping.header.operation, Operation::ping);
+  EXPECT_EQ(ping.header.operation, MessageOperation::ping);
   EXPECT_TRUE(ping.header.has(proto::gimi::kFlagAckWanted));
   const Taken again = next();
   EXPECT_EQ(again.header.sequence, ping.header.sequence) << "not answered: repeated";
@@ -152,7 +152,7 @@ TEST_F(SendStreamTest, AReportThatNamesNoMessageIsTheReasonOfWhatTheReceiverMiss
   report(proto::DropReason::too_old, 1, *lost);
   report(proto::DropReason::cut_message, 1, *lost);
   const Taken ping = next();
-  EXPECT_EQ(ping.header.operation, Operation::ping);
+  EXPECT_EQ(ping.header.operation, MessageOperation::ping);
   acknowledge(0, 0, ping.header.sequence);
   EXPECT_TRUE(stream.settle().is(Status::not_delivered));
   EXPECT_EQ(stream.counts().loss, "the hub reports too_old");
@@ -195,7 +195,8 @@ TEST_F(SendStreamTest, ARefusalFreesTheMessageAndSaysWhy) {
   const Sender stream = sender(3);
   stream.send("1").or_throw();
   next_data();
-  answer({1, Operation::error, 0, 0}, proto::gimi::encode_failure({6, "it is \x1b too large"}));
+  answer({1, MessageOperation::error, 0, 0},
+         proto::gimi::encode_error({6, "it is \x1b too large"}));
   EXPECT_TRUE(stream.settle().is(Status::not_delivered));
   EXPECT_EQ(stream.counts().loss, "the receiver refused it: it is ? too large");
   EXPECT_EQ(stream.counts().loss_reason, LossReason::refused);
@@ -205,8 +206,8 @@ TEST_F(SendStreamTest, AnErrorOfAnotherKindFreesNothing) {
   const Sender stream = sender(3);
   stream.send("1").or_throw();
   next_data();
-  answer({1, Operation::error, 0, 0}, proto::gimi::encode_failure({3, "what of it"}));
-  answer({1, Operation::error, 0, 0}, {});
+  answer({1, MessageOperation::error, 0, 0}, proto::gimi::encode_error({3, "what of it"}));
+  answer({1, MessageOperation::error, 0, 0}, {});
   acknowledge(1);
   EXPECT_TRUE(stream.settle());
   EXPECT_EQ(stream.counts().lost, 0u);
@@ -221,7 +222,7 @@ TEST_F(SendStreamTest, AReportOfManyMakesItAskAtOnce) {
   ASSERT_TRUE(second);
   report(proto::DropReason::shard_full, 2, *second);
   const Taken ping = next();
-  EXPECT_EQ(ping.header.operation, Operation::ping);
+  EXPECT_EQ(ping.header.operation, MessageOperation::ping);
   acknowledge(0, 0, ping.header.sequence);
   EXPECT_TRUE(stream.settle().is(Status::not_delivered));
   EXPECT_EQ(stream.counts().lost, 2u);
@@ -265,7 +266,7 @@ class SettledDoubt : public Conversation {
     for (;;) {
       const Taken taken = next();
       if (HasFailure()) return 0;
-      if (taken.header.operation == Operation::ping && taken.header.sequence != ping_)
+      if (taken.header.operation == MessageOperation::ping && taken.header.sequence != ping_)
         return taken.header.sequence;
     }
   }
@@ -328,25 +329,25 @@ TEST_F(SendStreamTest, ClosingTheNodeEndsAllWaits) {
 }
 
 TEST_F(SendStreamTest, AnswersPingsByItself) {
-  answer({77, Operation::ping, 0, 0}, std::as_bytes(std::span("time....echo", 12)));
+  answer({77, MessageOperation::ping, 0, 0}, std::as_bytes(std::span("time....echo", 12)));
   const Taken pong = next();
-  EXPECT_EQ(pong.header.operation, Operation::pong);
+  EXPECT_EQ(pong.header.operation, MessageOperation::pong);
   EXPECT_EQ(pong.header.sequence, 77u);
   EXPECT_EQ(pong.data, "time....echo");
 }
 
 TEST_F(SendStreamTest, AcknowledgesWhatItTookAndAgainBeforeAPong) {
   const std::array<std::byte, 8> data{};
-  answer({1, Operation::data, proto::gimi::kFlagAckWanted, 0}, data);
+  answer({1, MessageOperation::data, proto::gimi::kFlagAckWanted, 0}, data);
   const Taken ack = next();
-  EXPECT_EQ(ack.header.operation, Operation::ack);
+  EXPECT_EQ(ack.header.operation, MessageOperation::ack);
   EXPECT_EQ(ack.header.sequence, 1u);
-  answer({5, Operation::ping, proto::gimi::kFlagAckWanted, 0}, data);
+  answer({5, MessageOperation::ping, proto::gimi::kFlagAckWanted, 0}, data);
   const Taken repeated = next();
-  EXPECT_EQ(repeated.header.operation, Operation::ack);
+  EXPECT_EQ(repeated.header.operation, MessageOperation::ack);
   const auto bytes = std::as_bytes(std::span(repeated.data.data(), repeated.data.size()));
   EXPECT_EQ(proto::gimi::decode_ack(bytes)->pong_sequence, 5u);
-  EXPECT_EQ(next().header.operation, Operation::pong);
+  EXPECT_EQ(next().header.operation, MessageOperation::pong);
 }
 
 TEST_F(SendStreamTest, RefusesWhatCannotBe) {

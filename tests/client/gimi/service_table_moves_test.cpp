@@ -22,7 +22,7 @@ using test::Conversation;
 using test::kKey;
 using test::kOwnId;
 using test::kPeerId;
-using test::Operation;
+using test::MessageOperation;
 
 namespace ns = proto::ns;
 
@@ -76,7 +76,7 @@ class MovedServices : public Conversation, public testing::WithParamInterface<co
 
   /// What the hub said before was seen to by the node.
   void settle_down() {
-    answer({++sequence_, Operation::data, 0, 0}, {});
+    answer({++sequence_, MessageOperation::data, 0, 0}, {});
     EXPECT_EQ(node_->receive(kKey, kForever)->sequence(), sequence_);
   }
 

@@ -19,7 +19,7 @@ using test::Conversation;
 using test::kKey;
 using test::kOwnId;
 using test::kPeerId;
-using test::Operation;
+using test::MessageOperation;
 using test::Taken;
 
 constexpr std::uint32_t kGroup = (7u << 20) | 11;
@@ -31,13 +31,13 @@ class StreamEpochsTest : public Conversation {
   }
   void send_data(std::uint32_t epoch, std::uint32_t sequence, std::string_view text,
                  std::uint8_t flags = 0) {
-    answer({sequence, Operation::data, flags, 0, epoch}, bytes(text));
+    answer({sequence, MessageOperation::data, flags, 0, epoch}, bytes(text));
   }
   /// To the service, as its provider.
   void publish(std::uint32_t epoch, std::uint32_t sequence, std::string_view text) {
     std::array<std::byte, proto::gimi::kMessagePrefixMax> prefix;
     const std::size_t size = proto::gimi::write_message_prefix(
-        {sequence, Operation::data, 0, 0, epoch}, std::nullopt, prefix);
+        {sequence, MessageOperation::data, 0, 0, epoch}, std::nullopt, prefix);
     proto::FrameParts parts;
     parts.header.kind = proto::Kind::group;
     parts.header.dst = kGroup;
@@ -115,11 +115,11 @@ TEST_F(StreamEpochsTest, AnAckSpeaksOfOneEpoch) {
   EXPECT_EQ(ack.header.epoch, 2u);
   EXPECT_EQ(ack.header.sequence, 3u);
   const std::array<std::byte, proto::gimi::kPingTimeSize> sent{};
-  answer({9, Operation::ping, wanted, 0, 5}, sent);
+  answer({9, MessageOperation::ping, wanted, 0, 5}, sent);
   ack = next();
-  EXPECT_EQ(ack.header, (proto::gimi::MessageHeader{0, Operation::ack, 0, 0, 5}))
+  EXPECT_EQ(ack.header, (proto::gimi::MessageHeader{0, MessageOperation::ack, 0, 0, 5}))
       << "nothing came of that epoch";
-  EXPECT_EQ(next().header, (proto::gimi::MessageHeader{9, Operation::pong, 0, 0, 5}));
+  EXPECT_EQ(next().header, (proto::gimi::MessageHeader{9, MessageOperation::pong, 0, 0, 5}));
 }
 
 TEST_F(StreamEpochsTest, AnswersToAnotherEpochChangeNothing) {
@@ -128,13 +128,13 @@ TEST_F(StreamEpochsTest, AnswersToAnotherEpochChangeNothing) {
   const std::uint32_t epoch = next().header.epoch;
   std::array<std::byte, proto::gimi::kAckSizeMax> data;
   const std::size_t size = proto::gimi::encode_ack({0, 0, 0}, data);
-  answer({1, Operation::ack, 0, 0, epoch + 1}, std::span(data).first(size));
-  answer({1, Operation::error, 0, 0, epoch + 1}, proto::gimi::encode_failure({6, "large", 0}));
+  answer({1, MessageOperation::ack, 0, 0, epoch + 1}, std::span(data).first(size));
+  answer({1, MessageOperation::error, 0, 0, epoch + 1}, proto::gimi::encode_error({6, "large", 0}));
   send_data(1, 1, "behind them");
   ASSERT_TRUE(node_->receive(kKey));
   EXPECT_EQ(stream.counts().acknowledged, 0u);
   EXPECT_EQ(stream.counts().lost, 0u);
-  answer({1, Operation::ack, 0, 0, epoch}, std::span(data).first(size));
+  answer({1, MessageOperation::ack, 0, 0, epoch}, std::span(data).first(size));
   EXPECT_TRUE(stream.settle());
 }
 

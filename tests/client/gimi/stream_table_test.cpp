@@ -20,7 +20,7 @@ using test::kAll;
 using test::kKey;
 using test::kOwnId;
 using test::kPeerId;
-using test::Operation;
+using test::MessageOperation;
 using test::Taken;
 
 namespace ns = proto::ns;
@@ -81,7 +81,7 @@ class StreamTableTest : public Conversation {
 
   /// What the hub said before was seen to by the node: so was what it says behind it.
   void settle_down() {
-    answer({++sequence_, Operation::data, 0, 0}, {});
+    answer({++sequence_, MessageOperation::data, 0, 0}, {});
     EXPECT_EQ(node_->receive(kKey, kForever)->sequence(), sequence_);
   }
 
@@ -124,7 +124,7 @@ TEST_F(StreamTableTest, AsksTheServiceForMissingAcks) {
   drive.send("go").or_throw();
   static_cast<void>(next_data());
   const Taken ping = next();
-  EXPECT_EQ(ping.header.operation, Operation::ping);
+  EXPECT_EQ(ping.header.operation, MessageOperation::ping);
   EXPECT_EQ(ping.frame.kind, proto::Kind::service);
   EXPECT_EQ(ping.frame.dst, kGroup);
   acknowledge(1, kAll, ping.header.sequence, kGroup);
@@ -249,7 +249,7 @@ TEST_F(StreamTableTest, AcknowledgesWhatCameForAServiceInItsName) {
   payload[9] = static_cast<char>(proto::gimi::kFlagAckWanted);  // of DATA
   hub_.send(parts, payload + "go");
   const Taken ack = next();
-  EXPECT_EQ(ack.header.operation, Operation::ack);
+  EXPECT_EQ(ack.header.operation, MessageOperation::ack);
   EXPECT_EQ(ack.frame.kind, proto::Kind::unicast);
   EXPECT_EQ(ack.frame.dst, kPeerId);
   const auto read =

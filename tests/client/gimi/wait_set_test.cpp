@@ -322,7 +322,7 @@ TEST_F(WaitSetOfANodeTest, AnAnsweringServiceIsReadyWhileRequestsWait) {
   EXPECT_TRUE(join(set_, [&](const SourceVisitor& visitor) { answers.visit(visitor); }));
   EXPECT_EQ(ready(set_), Users{});
   Message late = test::make_message("x", 1);
-  EXPECT_TRUE(answers.on_request({1, proto::gimi::Operation::request, 0, 0, 7}, late, 0));
+  EXPECT_TRUE(answers.on_request({1, proto::gimi::MessageOperation::request, 0, 0, 7}, late, 0));
   EXPECT_EQ(ready(set_), Users{1});
   EXPECT_TRUE(answers.receive(kNoWait).is(Status::timeout));
   EXPECT_EQ(ready(set_), Users{});

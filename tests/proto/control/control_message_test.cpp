@@ -31,7 +31,7 @@ TEST(ControlMessage, BeginsWithOperationAndRequestNumber) {
 }
 
 TEST(ControlMessage, RefusalIsAnAnswerWithASentence) {
-  const ControlHeader request{static_cast<std::uint16_t>(ns::Operation::resolve), 1};
+  const ControlHeader request{static_cast<std::uint16_t>(ns::NsOperation::resolve), 1};
   const Refusal refusal{Status::not_found, "no node is named robot/base"};
   EXPECT_EQ(encode_refusal(request, refusal), payload_of("ns/refusal"));
   const auto answer = decode_answer<ns::ResolveAnswer>(payload_of("ns/refusal"));

@@ -30,8 +30,8 @@ TEST(GimiMessage, HasATimeStamp) {
   const auto payload = payload_of("gimi/data");
   const auto message = parse_message(payload);
   ASSERT_TRUE(message);
-  EXPECT_EQ(message->header,
-            (MessageHeader{1, Operation::data, kFlagAckWanted | kFlagTimestamp, 8, 0x5eed0001}));
+  EXPECT_EQ(message->header, (MessageHeader{1, MessageOperation::data,
+                                            kFlagAckWanted | kFlagTimestamp, 8, 0x5eed0001}));
   EXPECT_EQ(message->timestamp_ns, kNewYear);
   EXPECT_EQ(to_bytes(message->data), to_bytes("hi"));
 }
@@ -106,26 +106,26 @@ TEST(GimiPing, CarriesWhatIsToComeBack) {
 
 TEST(GimiError, HasAStatusAndASentence) {
   const auto payload = payload_of("gimi/error");
-  const auto failure = decode_failure(parse_message(payload)->data);
+  const auto failure = decode_error(parse_message(payload)->data);
   ASSERT_TRUE(failure);
   EXPECT_EQ(failure->status, 6);
   EXPECT_EQ(failure->sentence, "too large");
-  EXPECT_FALSE(decode_failure(parse_message(payload)->data.first(1)));
+  EXPECT_FALSE(decode_error(parse_message(payload)->data.first(1)));
   EXPECT_EQ(failure->group, 0u);
-  EXPECT_EQ(encode_failure(*failure), to_bytes(parse_message(payload)->data));
+  EXPECT_EQ(encode_error(*failure), to_bytes(parse_message(payload)->data));
 }
 
 TEST(GimiError, NamesTheServiceOfAStreamThatLeadsToOne) {
   const auto payload = payload_of("gimi/error_service");
   const auto data = to_bytes(parse_message(payload)->data);
-  const auto failure = decode_failure(data);
+  const auto failure = decode_error(data);
   ASSERT_TRUE(failure);
   EXPECT_EQ(failure->status, 6);
   EXPECT_EQ(failure->group, (7u << 20) | 5);
   EXPECT_EQ(failure->sentence, "too large");
-  EXPECT_EQ(encode_failure(*failure), data);
-  EXPECT_TRUE(decode_failure(std::span(data).first(6)));
-  EXPECT_FALSE(decode_failure(std::span(data).first(5)));
+  EXPECT_EQ(encode_error(*failure), data);
+  EXPECT_TRUE(decode_error(std::span(data).first(6)));
+  EXPECT_FALSE(decode_error(std::span(data).first(5)));
 }
 
 }  // namespace

@@ -36,7 +36,7 @@ std::uint64_t keep_alive_bytes() {
 
 bool changes_names(const proto::Payload& bytes) {
   const auto view = proto::split_control(bytes);
-  return view && view->header.operation == static_cast<std::uint16_t>(route::Operation::names);
+  return view && view->header.operation == static_cast<std::uint16_t>(route::RouteOperation::names);
 }
 
 }  // namespace
@@ -155,12 +155,12 @@ void ScaleNet::arrive(const Message& message) {
     hub.state->take_digest(end.number, message.digest, now_);
   } else {
     const auto view = proto::split_control(*message.bytes);
-    const auto operation = static_cast<route::Operation>(view->header.operation);
-    if (operation == route::Operation::records_end) {
+    const auto operation = static_cast<route::RouteOperation>(view->header.operation);
+    if (operation == route::RouteOperation::records_end) {
       hub.state->take_mark(end.number);
     } else if (!hub.whole) {
       return;
-    } else if (operation == route::Operation::record) {
+    } else if (operation == route::RouteOperation::record) {
       hub.state->take_record(end.number, *message.bytes, now_);
     } else {
       hub.names->take(end.number, *message.bytes, now_);

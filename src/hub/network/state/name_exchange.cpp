@@ -46,12 +46,12 @@ void NameExchange::take(LinkNumber number, std::span<const std::byte> bytes, mil
       ++malformed_;
     }
   };
-  switch (static_cast<route::Operation>(view->header.operation)) {
-    case route::Operation::names_known:
+  switch (static_cast<route::RouteOperation>(view->header.operation)) {
+    case route::RouteOperation::names_known:
       return read(proto::decode<route::NamesKnown>(bytes));
-    case route::Operation::names:
+    case route::RouteOperation::names:
       return read(proto::decode<route::Names>(bytes));
-    case route::Operation::names_taken:
+    case route::RouteOperation::names_taken:
       if (const auto taken = proto::decode<route::NamesTaken>(bytes)) {
         link->under_way -= std::min<std::size_t>(link->under_way, taken->messages);
         work_ = true;

@@ -22,7 +22,7 @@ using nif::test::Frame;
 using nif::test::kHubNode;
 using nif::test::kOwnId;
 using nif::test::kPeerId;
-using proto::gimi::Operation;
+using proto::gimi::MessageOperation;
 
 inline constexpr MessageKey kKey{3, 4};
 inline constexpr std::uint64_t kAll = ~std::uint64_t{0};
@@ -70,7 +70,7 @@ class Conversation : public testing::Test {
     for (;;) {
       auto frame = hub_.next_message();
       EXPECT_TRUE(frame.has_value());
-      if (!frame || taken_of(*frame).header.operation != Operation::ping) return frame;
+      if (!frame || taken_of(*frame).header.operation != MessageOperation::ping) return frame;
     }
   }
 
@@ -89,7 +89,7 @@ class Conversation : public testing::Test {
   /// A DATA, or the answer to what came last.
   void answer(proto::gimi::MessageHeader header, std::span<const std::byte> data,
               std::uint32_t from = kPeerId) {
-    if (header.operation != Operation::data && header.epoch == 0) header.epoch = epoch_;
+    if (header.operation != MessageOperation::data && header.epoch == 0) header.epoch = epoch_;
     std::array<std::byte, proto::gimi::kMessagePrefixMax> prefix;
     const std::size_t size = proto::gimi::write_message_prefix(header, std::nullopt, prefix);
     std::string payload(reinterpret_cast<const char*>(prefix.data()), size);
@@ -105,7 +105,7 @@ class Conversation : public testing::Test {
                    std::uint32_t group = 0) {
     std::array<std::byte, proto::gimi::kAckSizeMax> data;
     const std::size_t size = proto::gimi::encode_ack({bitmap, pong, group}, data);
-    answer({sequence, Operation::ack, 0, 0}, std::span(data).first(size));
+    answer({sequence, MessageOperation::ack, 0, 0}, std::span(data).first(size));
   }
   void report(proto::DropReason reason, std::uint32_t count, const Frame& frame) {
     std::string payload{static_cast<char>(reason), 0, 0, 0};
