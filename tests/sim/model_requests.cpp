@@ -108,7 +108,7 @@ void Model::judge_services(const Asked& asked, std::uint16_t operation) {
       return judge_subscribe(asked);
     case ns::Unsubscribe::kOperation:
       return judge_unsubscribe(asked);
-    case ns::Services::kOperation:
+    case ns::ServicesRequest::kOperation:
       return judge_service_list(asked);
     case ns::Watch::kOperation:
       return judge_watch(asked);
@@ -194,7 +194,7 @@ void Model::judge_list(const Asked& asked) {
 }
 
 void Model::judge_service_list(const Asked& asked) {
-  const auto wanted = proto::decode<ns::Services>(asked.payload);
+  const auto wanted = proto::decode<ns::ServicesRequest>(asked.payload);
   const bool legal = wanted && (wanted->pattern.empty() || proto::valid_pattern(wanted->pattern));
   if (!legal) return require_status(asked, Status::bad_request, Checker::answers);
   require_status(asked, Status::done, Checker::answers);

@@ -55,7 +55,7 @@ void SimNode::ask_about_names(std::uint64_t choice) {
     return ask(list, {});
   }
   if (choice < 20) {
-    ns::Services list;
+    ns::ServicesRequest list;
     list.pattern = some_pattern(true);
     list.records_max = static_cast<std::uint32_t>(random.between(1, 50));
     return ask(list, {});

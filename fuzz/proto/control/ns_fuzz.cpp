@@ -22,7 +22,7 @@ void check_requests(Bytes payload) {
   fuzz::check_message<ns::List>(payload);
   fuzz::check_message<ns::Advertise>(payload);
   fuzz::check_message<ns::Withdraw>(payload);
-  fuzz::check_message<ns::Services>(payload);
+  fuzz::check_message<ns::ServicesRequest>(payload);
   fuzz::check_message<ns::Subscribe>(payload);
   fuzz::check_message<ns::Unsubscribe>(payload);
   fuzz::check_message<ns::ServiceMoved>(payload);
@@ -42,10 +42,10 @@ void check_requests(Bytes payload) {
   fuzz::check_message<ctrl::Reload>(payload);
   fuzz::check_message<ctrl::SetLogLevel>(payload);
   fuzz::check_message<ctrl::Hubs>(payload);
-  fuzz::check_message<ctrl::Links>(payload);
+  fuzz::check_message<ctrl::LinksRequest>(payload);
   fuzz::check_message<ctrl::LinkAdd>(payload);
   fuzz::check_message<ctrl::LinkRemove>(payload);
-  fuzz::check_message<ctrl::LinkCost>(payload);
+  fuzz::check_message<ctrl::SetLinkCost>(payload);
 }
 
 /// A list that was accepted has an id in each record.

@@ -195,7 +195,7 @@ Outcome<std::vector<LinkRecord>> ask_links(Asking who, Timeout timeout) {
   const std::int64_t deadline = deadline_after(timeout);
   std::vector<LinkRecord> records;
   for (;;) {
-    const proto::ctrl::Links request{.skip = static_cast<std::uint32_t>(records.size())};
+    const proto::ctrl::LinksRequest request{.skip = static_cast<std::uint32_t>(records.size())};
     const auto page = ask<proto::ctrl::LinksAnswer>(who, request, "ask the hub for its links",
                                                     Timeout{nif_timeout_until(deadline)});
     if (!page) return page.failure();
@@ -281,7 +281,7 @@ Outcome<void> remove_link(nif_node* node, std::string_view name, Timeout timeout
 
 Outcome<void> set_link_cost(nif_node* node, std::string_view name, std::uint16_t cost,
                             Timeout timeout) {
-  return change_link(node, proto::ctrl::LinkCost{std::string(name), cost},
+  return change_link(node, proto::ctrl::SetLinkCost{std::string(name), cost},
                      "set the cost of the link", timeout);
 }
 

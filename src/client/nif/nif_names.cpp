@@ -144,7 +144,7 @@ nif_status nif_list_services(nif_node* node, const char* pattern, nif_service_li
     *list = nullptr;
     if (const nif_status status = check_pattern(pattern); status != NIF_OK) return status;
     std::vector<ns::ServiceRecord> records;
-    ns::Services request;
+    ns::ServicesRequest request;
     request.pattern = pattern != nullptr ? pattern : "";
     const nif_status status = list_pages(
         found, request, &ns::ServicesAnswer::services,

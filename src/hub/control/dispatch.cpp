@@ -38,7 +38,7 @@ constexpr std::array kTable{
     TableRow{Kind::ns, ns::List::kOperation, everybody, handle_list},
     TableRow{Kind::ns, ns::Advertise::kOperation, everybody, handle_advertise},
     TableRow{Kind::ns, ns::Withdraw::kOperation, everybody, handle_withdraw},
-    TableRow{Kind::ns, ns::Services::kOperation, everybody, handle_services},
+    TableRow{Kind::ns, ns::ServicesRequest::kOperation, everybody, handle_services},
     TableRow{Kind::ns, ns::Subscribe::kOperation, everybody, handle_subscribe},
     TableRow{Kind::ns, ns::Unsubscribe::kOperation, everybody, handle_unsubscribe},
     TableRow{Kind::ns, ns::Watch::kOperation, everybody, handle_watch},
@@ -48,7 +48,7 @@ constexpr std::array kTable{
     TableRow{Kind::ctrl, ctrl::Statistics::kOperation, everybody, handle_statistics},
     TableRow{Kind::ctrl, ctrl::Connections::kOperation, everybody, handle_connections},
     TableRow{Kind::ctrl, ctrl::Hubs::kOperation, everybody, handle_hubs},
-    TableRow{Kind::ctrl, ctrl::Links::kOperation, everybody, handle_links},
+    TableRow{Kind::ctrl, ctrl::LinksRequest::kOperation, everybody, handle_links},
     TableRow{Kind::ctrl, ctrl::Kick::kOperation, admins, handle_kick},
     TableRow{Kind::ctrl, ctrl::Reassign::kOperation, admins, handle_reassign},
     TableRow{Kind::ctrl, ctrl::Drain::kOperation, admins, handle_drain},
@@ -56,7 +56,7 @@ constexpr std::array kTable{
     TableRow{Kind::ctrl, ctrl::SetLogLevel::kOperation, admins, handle_log_level},
     TableRow{Kind::ctrl, ctrl::LinkAdd::kOperation, admins, handle_link_add},
     TableRow{Kind::ctrl, ctrl::LinkRemove::kOperation, admins, handle_link_remove},
-    TableRow{Kind::ctrl, ctrl::LinkCost::kOperation, admins, handle_link_cost},
+    TableRow{Kind::ctrl, ctrl::SetLinkCost::kOperation, admins, handle_link_cost},
 };
 
 Roles mask_of(Role role) { return role == Role::admin ? admins : nodes; }
@@ -86,10 +86,10 @@ Handler handler_for(Role role, Kind kind, std::uint16_t operation) {
 
 Handler handler_from_afar(NodeId asker, Kind kind, std::uint16_t operation) {
   constexpr std::array kNames{ns::Resolve::kOperation, ns::Reverse::kOperation,
-                              ns::List::kOperation, ns::Services::kOperation};
+                              ns::List::kOperation, ns::ServicesRequest::kOperation};
   constexpr std::array kAdmin{ctrl::HubInfo::kOperation, ctrl::Statistics::kOperation,
                               ctrl::Connections::kOperation, ctrl::Hubs::kOperation,
-                              ctrl::Links::kOperation};
+                              ctrl::LinksRequest::kOperation};
   const auto has = [operation](const auto& all) {
     return std::ranges::find(all, operation) != all.end();
   };

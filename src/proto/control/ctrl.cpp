@@ -12,8 +12,8 @@ namespace {
 constexpr std::size_t kRecordOverhead = 128;
 constexpr std::size_t kConnectionOverhead = 192;
 
-std::vector<Counter> read_counters(Fields& counters) {
-  std::vector<Counter> found;
+std::vector<CounterValue> read_counters(Fields& counters) {
+  std::vector<CounterValue> found;
   bitestream::Reader reader = counters.reader();
   while (const auto value = reader.next()) {
     const auto count = value->as<std::uint64_t>();
@@ -83,7 +83,7 @@ void StatisticsAnswer::write(bitestream::Writer& writer) const {
     writer.begin_nested(3);
     writer.put_u16(1, record.shard);
     writer.begin_nested(2);
-    for (const Counter& counter : record.counters)
+    for (const CounterValue& counter : record.counters)
       writer.put_u64(std::string_view(counter.name), counter.value);
     writer.end_nested();
     writer.end_nested();
@@ -94,7 +94,7 @@ StatisticsAnswer StatisticsAnswer::read(Fields& fields) {
   answer.shards = fields.records<ShardRecord>(3, "shard record", [](Fields& record) {
     ShardRecord shard;
     shard.shard = record.required_number<std::uint16_t>(1, "shard");
-    const auto counters = record.records<std::vector<Counter>>(2, "counters", read_counters);
+    const auto counters = record.records<std::vector<CounterValue>>(2, "counters", read_counters);
     for (const auto& some : counters)
       shard.counters.insert(shard.counters.end(), some.begin(), some.end());
     return shard;

@@ -82,10 +82,10 @@ struct Statistics {
 };
 
 /// Named as in docs/operations.md; 1..255 bytes of UTF-8.
-struct Counter {
+struct CounterValue {
   std::string name;
   std::uint64_t value = 0;
-  friend bool operator==(const Counter&, const Counter&) = default;
+  friend bool operator==(const CounterValue&, const CounterValue&) = default;
 };
 
 /// The number of the record that is no shard's: what the conductor counted.
@@ -93,7 +93,7 @@ inline constexpr std::uint16_t kConductorRecord = 65'535;
 
 struct ShardRecord {
   std::uint16_t shard = 0;  ///< or kConductorRecord
-  std::vector<Counter> counters;
+  std::vector<CounterValue> counters;
   friend bool operator==(const ShardRecord&, const ShardRecord&) = default;
 };
 

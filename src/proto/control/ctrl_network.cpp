@@ -90,12 +90,12 @@ HubsAnswer HubsAnswer::read(Fields& fields) {
   return answer;
 }
 
-void Links::write(bitestream::Writer& writer) const {
+void LinksRequest::write(bitestream::Writer& writer) const {
   if (skip != 0) writer.put_u32(4, skip);
   if (records_max != kPageRecordsDefault) writer.put_u32(5, records_max);
 }
-Links Links::read(Fields& fields) {
-  Links links;
+LinksRequest LinksRequest::read(Fields& fields) {
+  LinksRequest links;
   links.skip = fields.number<std::uint32_t>(4, "number of records to skip", 0);
   links.records_max = fields.number<std::uint32_t>(5, "number of records", kPageRecordsDefault);
   return links;
@@ -195,11 +195,11 @@ LinkRemove LinkRemove::read(Fields& fields) {
   return {fields.required_text(3, "name", kWrittenNameBytesMax)};
 }
 
-void LinkCost::write(bitestream::Writer& writer) const {
+void SetLinkCost::write(bitestream::Writer& writer) const {
   put_clean_text(writer, 3, name, kWrittenNameBytesMax);
   if (cost != 0) writer.put_u16(4, cost);
 }
-LinkCost LinkCost::read(Fields& fields) {
+SetLinkCost SetLinkCost::read(Fields& fields) {
   return {fields.required_text(3, "name", kWrittenNameBytesMax),
           fields.number<std::uint16_t>(4, "cost", 0)};
 }

@@ -64,14 +64,14 @@ struct HubsAnswer {
 
 // LINKS: the links of this hub, in pages
 
-struct Links {
+struct LinksRequest {
   static constexpr std::uint16_t kOperation = request_of(CtrlOperation::links);
   static constexpr const char* kName = "LINKS";
   std::uint32_t skip = 0;  ///< records of earlier pages
   std::uint32_t records_max = kPageRecordsDefault;
   void write(bitestream::Writer& writer) const;
-  [[nodiscard]] static Links read(Fields& fields);
-  friend bool operator==(const Links&, const Links&) = default;
+  [[nodiscard]] static LinksRequest read(Fields& fields);
+  friend bool operator==(const LinksRequest&, const LinksRequest&) = default;
 };
 
 enum class LinkState : std::uint16_t {
@@ -152,14 +152,14 @@ struct LinkRemove {
 
 // LINK_COST: fixes the cost of a dialled link
 
-struct LinkCost {
+struct SetLinkCost {
   static constexpr std::uint16_t kOperation = request_of(CtrlOperation::link_cost);
   static constexpr const char* kName = "LINK_COST";
   std::string name;
   std::uint16_t cost = 0;  ///< 0: measured
   void write(bitestream::Writer& writer) const;
-  [[nodiscard]] static LinkCost read(Fields& fields);
-  friend bool operator==(const LinkCost&, const LinkCost&) = default;
+  [[nodiscard]] static SetLinkCost read(Fields& fields);
+  friend bool operator==(const SetLinkCost&, const SetLinkCost&) = default;
 };
 
 /// The answer to one of the last three.

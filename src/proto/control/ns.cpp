@@ -220,11 +220,11 @@ Withdraw Withdraw::read(Fields& fields) {
   return {read_required_id<GroupId>(fields, 3, "group id")};
 }
 
-void Services::write(bitestream::Writer& writer) const {
+void ServicesRequest::write(bitestream::Writer& writer) const {
   write_page_request(writer, pattern, after.value(), records_max);
 }
-Services Services::read(Fields& fields) {
-  Services services;
+ServicesRequest ServicesRequest::read(Fields& fields) {
+  ServicesRequest services;
   services.pattern = fields.text(3, "pattern", kNameBytesMax);
   services.after = read_id<GroupId>(fields, 4, "group id to continue after");
   services.records_max = fields.number<std::uint32_t>(5, "number of records", kPageRecordsDefault);

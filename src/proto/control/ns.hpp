@@ -195,15 +195,15 @@ struct WithdrawAnswer {
 
 // SERVICES: services by pattern over their full names, in pages of ascending group ids
 
-struct Services {
+struct ServicesRequest {
   static constexpr std::uint16_t kOperation = request_of(NsOperation::services);
   static constexpr const char* kName = "SERVICES";
   std::string pattern;  ///< empty: all
   GroupId after;        ///< continue after this one; 0: from the start
   std::uint32_t records_max = kPageRecordsDefault;
   void write(bitestream::Writer& writer) const;
-  [[nodiscard]] static Services read(Fields& fields);
-  friend bool operator==(const Services&, const Services&) = default;
+  [[nodiscard]] static ServicesRequest read(Fields& fields);
+  friend bool operator==(const ServicesRequest&, const ServicesRequest&) = default;
 };
 
 struct ServiceRecord {

@@ -244,7 +244,7 @@ class RequestsAtAFakeHub : public gimi::test::Conversation {
       record.message_type = proto::gimi::kRequestType;
       listed.services.push_back(record);
     }
-    tell(take<ns::Services>(), listed);
+    tell(take<ns::ServicesRequest>(), listed);
   }
   void answer_subscribe(std::uint64_t session = kSession) {
     ns::SubscribeAnswer place;

@@ -34,7 +34,7 @@ class StreamTableTest : public Conversation {
   /// Answers the one question with one service, and the other with where it is.
   void serve(ns::Direction direction = ns::Direction::accepts) {
     std::uint16_t number = 0;
-    ASSERT_TRUE(hub_.next_request<ns::Services>(number));
+    ASSERT_TRUE(hub_.next_request<ns::ServicesRequest>(number));
     ns::ServicesAnswer listed;
     listed.services.resize(1);
     listed.services[0].group = GroupId{kGroup};

@@ -241,7 +241,7 @@ TEST(NifNames, DoesNotFollowAHubThatPagesForEver) {
       [&] {
         std::uint16_t number = 0;
         for (int i = 0; i < 2; ++i) {
-          ASSERT_TRUE(connected.hub.next_request<ns::Services>(number));
+          ASSERT_TRUE(connected.hub.next_request<ns::ServicesRequest>(number));
           ns::ServicesAnswer answer;
           answer.more = true;
           answer.services.resize(1);

@@ -75,11 +75,11 @@ TEST(Dispatch, GrantsEachRoleExactlyWhatItMay) {
   namespace ctrl = proto::ctrl;
   const std::set<std::uint16_t> known{ctrl::HubInfo::kOperation, ctrl::Statistics::kOperation,
                                       ctrl::Connections::kOperation, ctrl::Hubs::kOperation,
-                                      ctrl::Links::kOperation};
-  const std::set<std::uint16_t> changing{ctrl::Kick::kOperation,        ctrl::Reassign::kOperation,
-                                         ctrl::Drain::kOperation,       ctrl::Reload::kOperation,
-                                         ctrl::SetLogLevel::kOperation, ctrl::LinkAdd::kOperation,
-                                         ctrl::LinkRemove::kOperation,  ctrl::LinkCost::kOperation};
+                                      ctrl::LinksRequest::kOperation};
+  const std::set<std::uint16_t> changing{
+      ctrl::Kick::kOperation,       ctrl::Reassign::kOperation,    ctrl::Drain::kOperation,
+      ctrl::Reload::kOperation,     ctrl::SetLogLevel::kOperation, ctrl::LinkAdd::kOperation,
+      ctrl::LinkRemove::kOperation, ctrl::SetLinkCost::kOperation};
   const Handler unknown = handler_for(Role::admin, Kind::ctrl, 0xffff);
   for (std::uint32_t operation = 0; operation <= 0xffff; ++operation) {
     const auto number = static_cast<std::uint16_t>(operation);

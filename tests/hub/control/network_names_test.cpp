@@ -229,7 +229,8 @@ TEST_F(NetworkNamesTest, ListsGoThroughAllHubsInPages) {
       wanted.after = page->next;
     }
     EXPECT_EQ(names, (std::vector<std::string>{"a", "b", "robot/1", "robot/2"}));
-    const auto services = side->ask<ns::ServicesAnswer>(handle_services, asker, ns::Services{});
+    const auto services =
+        side->ask<ns::ServicesAnswer>(handle_services, asker, ns::ServicesRequest{});
     ASSERT_TRUE(services);
     ASSERT_EQ(services->services.size(), 2u);
     EXPECT_EQ(services->services[1].name, "robot/1/odom");

@@ -60,19 +60,19 @@ TEST(CtrlNetworkMessages, AreDecodedAndWrittenAsTheVectorsSay) {
                       "0.1.0",
                       {{HubId{8}, 60}, {HubId{12}, 10}}};
   expect_answer("ctrl/hubs_answer", 9, HubsAnswer{{some_hub(), far}, true});
-  expect_request("ctrl/links", 10, Links{1});
+  expect_request("ctrl/links", 10, LinksRequest{1});
   expect_answer("ctrl/links_answer", 10, LinksAnswer{{some_link()}, false});
   expect_request("ctrl/link_add", 11, LinkAdd{"tcp://10.0.0.9:7450", "far", 50, "http://p:1"});
   expect_answer("ctrl/link_add_answer", 11, LinkChanged<LinkAdd>{});
   expect_request("ctrl/link_remove", 12, LinkRemove{"far"});
   expect_answer("ctrl/link_remove_answer", 12, LinkChanged<LinkRemove>{});
-  expect_request("ctrl/link_cost", 13, LinkCost{"far", 20});
-  expect_answer("ctrl/link_cost_answer", 13, LinkChanged<LinkCost>{});
+  expect_request("ctrl/link_cost", 13, SetLinkCost{"far", 20});
+  expect_answer("ctrl/link_cost_answer", 13, LinkChanged<SetLinkCost>{});
 }
 
 TEST(CtrlNetworkMessages, OmitWhatIsTheDefault) {
   EXPECT_EQ(encode(Hubs{}, 1).size(), kControlHeaderSize);
-  EXPECT_EQ(encode(Links{}, 1).size(), kControlHeaderSize);
+  EXPECT_EQ(encode(LinksRequest{}, 1).size(), kControlHeaderSize);
   const auto added = decode<LinkAdd>(encode(LinkAdd{"unix:/a", "", 0}, 1));
   ASSERT_TRUE(added);
   EXPECT_EQ(added->name, "");

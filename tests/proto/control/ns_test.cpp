@@ -39,7 +39,7 @@ TEST(NsMessages, AreDecodedAndWrittenAsTheVectorsSay) {
   expect_answer("ns/advertise_answer", 4, AdvertiseAnswer{kGroup, 2});
   expect_request("ns/withdraw", 5, Withdraw{kGroup});
   expect_answer("ns/withdraw_answer", 5, WithdrawAnswer{});
-  expect_request("ns/services", 6, Services{});
+  expect_request("ns/services", 6, ServicesRequest{});
   expect_request("ns/subscribe", 7, Subscribe{"robot/odom"});
   SubscribeAnswer answer{state(kNode)};
   answer.instance = 1;

@@ -69,7 +69,7 @@ void World::change_a_wire(std::uint64_t kind) {
   if (kind == 0) {
     census_.note(Event::other_cost);
     wire.plan.cost = cost;
-    if (wire.wanted) person.command(ctrl::LinkCost{link.name, cost});
+    if (wire.wanted) person.command(ctrl::SetLinkCost{link.name, cost});
   } else if (wire.wanted) {
     census_.note(Event::link_removed);
     wire.wanted = false;

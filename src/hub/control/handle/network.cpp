@@ -88,7 +88,7 @@ ctrl::LinkRecord record_of(const LinkView& link) {
           .last_error = link.last_error};
 }
 
-ctrl::LinksAnswer links(const HandlerContext& context, const ctrl::Links& wanted) {
+ctrl::LinksAnswer links(const HandlerContext& context, const ctrl::LinksRequest& wanted) {
   std::vector<LinkView> all;
   if (context.network != nullptr) all = context.network->links();
   std::ranges::sort(all, [](const LinkView& a, const LinkView& b) {
@@ -146,7 +146,7 @@ proto::Payload handle_hubs(HandlerContext& context, const Request& request) {
 }
 
 proto::Payload handle_links(HandlerContext& context, const Request& request) {
-  return answer_to<ctrl::Links>(request, [&](const ctrl::Links& wanted) {
+  return answer_to<ctrl::LinksRequest>(request, [&](const ctrl::LinksRequest& wanted) {
     return Result<ctrl::LinksAnswer, Refusal>(links(context, wanted));
   });
 }
@@ -166,11 +166,11 @@ proto::Payload handle_link_remove(HandlerContext& context, const Request& reques
 }
 
 proto::Payload handle_link_cost(HandlerContext& context, const Request& request) {
-  return answer_to<ctrl::LinkCost>(
-      request, [&](const ctrl::LinkCost& wanted) -> Changed<ctrl::LinkCost> {
+  return answer_to<ctrl::SetLinkCost>(
+      request, [&](const ctrl::SetLinkCost& wanted) -> Changed<ctrl::SetLinkCost> {
         if (context.network == nullptr) return alone();
-        return changed<ctrl::LinkCost>(Status::not_found,
-                                       context.network->set_link_cost(wanted.name, wanted.cost));
+        return changed<ctrl::SetLinkCost>(Status::not_found,
+                                          context.network->set_link_cost(wanted.name, wanted.cost));
       });
 }
 

@@ -121,7 +121,7 @@ Result<ns::AdvertiseAnswer, proto::Refusal> advertise(HandlerContext& context,
 
 Result<ns::ServicesAnswer, proto::Refusal> services(const HandlerContext& context,
                                                     const Request& request,
-                                                    const ns::Services& wanted) {
+                                                    const ns::ServicesRequest& wanted) {
   const auto pattern = proto::Pattern::parse(wanted.pattern);
   if (!wanted.pattern.empty() && !pattern) {
     return proto::Refusal{Status::bad_request,
@@ -171,8 +171,9 @@ proto::Payload handle_withdraw(HandlerContext& context, const Request& request) 
 }
 
 proto::Payload handle_services(HandlerContext& context, const Request& request) {
-  return answer_to<ns::Services>(
-      request, [&](const ns::Services& wanted) { return services(context, request, wanted); });
+  return answer_to<ns::ServicesRequest>(request, [&](const ns::ServicesRequest& wanted) {
+    return services(context, request, wanted);
+  });
 }
 
 proto::Payload handle_subscribe(HandlerContext& context, const Request& request) {

@@ -49,7 +49,7 @@ TEST_F(AdminTest, TellsTheCountersOfEveryShard) {
   ASSERT_EQ(statistics.shards.size(), 2u);
   EXPECT_EQ(statistics.shards[1].shard, 1u);
   const auto& list = statistics.shards[1].counters;
-  EXPECT_NE(std::find(list.begin(), list.end(), ctrl::Counter{"delivered", 42}), list.end());
+  EXPECT_NE(std::find(list.begin(), list.end(), ctrl::CounterValue{"delivered", 42}), list.end());
 }
 
 TEST_F(AdminTest, TellsWhoWasRefusedInARecordOfItsOwn) {

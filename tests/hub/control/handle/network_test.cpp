@@ -91,12 +91,13 @@ TEST_F(NetworkHandlerTest, AHubAloneKnowsItselfAndHasNoLinks) {
   EXPECT_EQ(hubs->hubs[0].version, "1.2.3");
   EXPECT_EQ(hubs->hubs[0].next_hop, HubId{7});
   EXPECT_TRUE(hubs->hubs[0].reachable);
-  const auto links = ask<ctrl::LinksAnswer>(handle_links, ctrl::Links{});
+  const auto links = ask<ctrl::LinksAnswer>(handle_links, ctrl::LinksRequest{});
   ASSERT_TRUE(links);
   EXPECT_THAT(links->links, SizeIs(0));
   EXPECT_EQ(add({"unix:/a"}).error().status, Status::not_supported);
   EXPECT_FALSE(ask<ctrl::LinkChanged<ctrl::LinkRemove>>(handle_link_remove, ctrl::LinkRemove{"a"}));
-  EXPECT_FALSE(ask<ctrl::LinkChanged<ctrl::LinkCost>>(handle_link_cost, ctrl::LinkCost{"a", 1}));
+  EXPECT_FALSE(
+      ask<ctrl::LinkChanged<ctrl::SetLinkCost>>(handle_link_cost, ctrl::SetLinkCost{"a", 1}));
 }
 
 TEST_F(NetworkHandlerTest, HubsAreToldByAscendingIdsWithTheWay) {
@@ -146,7 +147,7 @@ TEST_F(NetworkHandlerTest, LinksAreToldByTheirNamesInPages) {
   up.received_bytes = 7;
   up.last_error = "it broke";
   network_.all_links = {up, LinkView{.name = "c"}, LinkView{.name = "a"}};
-  const auto first = ask<ctrl::LinksAnswer>(handle_links, ctrl::Links{.records_max = 2});
+  const auto first = ask<ctrl::LinksAnswer>(handle_links, ctrl::LinksRequest{.records_max = 2});
   ASSERT_TRUE(first);
   ASSERT_THAT(first->links, SizeIs(2));
   EXPECT_TRUE(first->more);
@@ -162,7 +163,7 @@ TEST_F(NetworkHandlerTest, LinksAreToldByTheirNamesInPages) {
                                                40,
                                                {5, 6, 7, 1, 2, 4, 3},
                                                "it broke"}));
-  const auto rest = ask<ctrl::LinksAnswer>(handle_links, ctrl::Links{2, 2});
+  const auto rest = ask<ctrl::LinksAnswer>(handle_links, ctrl::LinksRequest{2, 2});
   ASSERT_TRUE(rest);
   ASSERT_THAT(rest->links, SizeIs(1));
   EXPECT_EQ(rest->links[0].name, "c");
@@ -199,15 +200,15 @@ TEST_F(NetworkHandlerTest, AddsNoLinkThatIsWrong) {
 
 TEST_F(NetworkHandlerTest, RemovesALinkAndChangesItsCost) {
   using Removed = ctrl::LinkChanged<ctrl::LinkRemove>;
-  using Priced = ctrl::LinkChanged<ctrl::LinkCost>;
+  using Priced = ctrl::LinkChanged<ctrl::SetLinkCost>;
   EXPECT_TRUE(ask<Removed>(handle_link_remove, ctrl::LinkRemove{"lab"}));
   EXPECT_EQ(network_.removed, "lab");
-  EXPECT_TRUE(ask<Priced>(handle_link_cost, ctrl::LinkCost{"lab", 50}));
+  EXPECT_TRUE(ask<Priced>(handle_link_cost, ctrl::SetLinkCost{"lab", 50}));
   EXPECT_EQ(network_.costs, (std::vector{std::pair{std::string{"lab"}, std::uint16_t{50}}}));
   network_.fault = "there is no link 'lab'";
   EXPECT_EQ(ask<Removed>(handle_link_remove, ctrl::LinkRemove{"lab"}).error().status,
             Status::not_found);
-  EXPECT_EQ(ask<Priced>(handle_link_cost, ctrl::LinkCost{"lab", 0}).error().sentence,
+  EXPECT_EQ(ask<Priced>(handle_link_cost, ctrl::SetLinkCost{"lab", 0}).error().sentence,
             network_.fault);
 }
 

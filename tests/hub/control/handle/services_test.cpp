@@ -30,7 +30,7 @@ TEST_F(ServiceRequestsTest, AServiceIsNamedAfterItsNode) {
           .service = "odom", .message_type = 5, .instance = 6, .delivery = ns::Delivery::latest});
   ASSERT_TRUE(advertised);
   EXPECT_EQ(hub_of(advertised->group), kHub);
-  const auto answer = ask<ns::ServicesAnswer>(robot, ns::Services{});
+  const auto answer = ask<ns::ServicesAnswer>(robot, ns::ServicesRequest{});
   ASSERT_TRUE(answer);
   ASSERT_EQ(answer->services.size(), 1u);
   ns::ServiceRecord expected;
@@ -55,7 +55,7 @@ TEST_F(ServiceRequestsTest, SyncAndRetainAreShownAndKeptToTheirLimits) {
   ns::Advertise offer{
       .service = "map", .delivery = ns::Delivery::sync, .window = 1024, .retain = true};
   ASSERT_TRUE(ask<ns::AdvertiseAnswer>(robot, offer));
-  const auto listed = ask<ns::ServicesAnswer>(robot, ns::Services{});
+  const auto listed = ask<ns::ServicesAnswer>(robot, ns::ServicesRequest{});
   ASSERT_TRUE(listed);
   EXPECT_EQ(listed->services[0].window, 1024u);
   EXPECT_TRUE(listed->services[0].retain);
@@ -254,14 +254,15 @@ TEST_F(ServiceRequestsTest, ServicesAreListedByPatternAndInPages) {
     ASSERT_TRUE(
         ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = name, .metadata = metadata}));
   }
-  EXPECT_EQ(ask<ns::ServicesAnswer>(robot, ns::Services{.pattern = "robot/s7"})->services.size(),
-            1u);
-  EXPECT_EQ(ask<ns::ServicesAnswer>(robot, ns::Services{.pattern = "**/"}).error().status,
+  EXPECT_EQ(
+      ask<ns::ServicesAnswer>(robot, ns::ServicesRequest{.pattern = "robot/s7"})->services.size(),
+      1u);
+  EXPECT_EQ(ask<ns::ServicesAnswer>(robot, ns::ServicesRequest{.pattern = "**/"}).error().status,
             Status::bad_request);
   std::size_t seen = 0;
   GroupId after{};
   for (int page = 0; page < 10; ++page) {
-    const auto answer = ask<ns::ServicesAnswer>(robot, ns::Services{.after = after});
+    const auto answer = ask<ns::ServicesAnswer>(robot, ns::ServicesRequest{.after = after});
     ASSERT_TRUE(answer);
     EXPECT_LE(std::get<SendControlCommand>(shards.sent.back().command).frame.size(),
               proto::kHeaderSize + limits.frame_bytes);
@@ -274,12 +275,13 @@ TEST_F(ServiceRequestsTest, ServicesAreListedByPatternAndInPages) {
 
 TEST_F(ServiceRequestsTest, ANodeHasAsManyServicesAsTheLimitSaysAndNoMore) {
   const Node robot = join("robot");
-  EXPECT_TRUE(ask<ns::ServicesAnswer>(robot, ns::Services{})->services.empty());
+  EXPECT_TRUE(ask<ns::ServicesAnswer>(robot, ns::ServicesRequest{})->services.empty());
   for (std::uint64_t i = 0; i < limits.services_per_node; ++i) {
     ASSERT_TRUE(ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "s" + std::to_string(i)}))
         << i;
     if (i + 1 == 1 || i + 1 == 100) {
-      EXPECT_EQ(ask<ns::ServicesAnswer>(robot, ns::Services{.pattern = "robot/*"})->services.size(),
+      EXPECT_EQ(ask<ns::ServicesAnswer>(robot, ns::ServicesRequest{.pattern = "robot/*"})
+                    ->services.size(),
                 i + 1);
     }
   }
