@@ -131,10 +131,10 @@ class FaultProxy::Relay {
   void accept_all(std::int64_t now_ns);
   void serve(RelayedConnection& connection, std::int64_t now_ns);
   void read(Flow& flow, const End& from, std::int64_t now_ns);
-  void write(RelayedConnection& connection, Flow& flow, const End& to, Way way,
+  void write(RelayedConnection& connection, Flow& flow, const End& to, RelayDirection way,
              std::int64_t now_ns);
   /// Nothing of this way is written before.
-  [[nodiscard]] std::int64_t stalled_until_ns(Way way) const;
+  [[nodiscard]] std::int64_t stalled_until_ns(RelayDirection way) const;
   [[nodiscard]] std::int64_t drawn(std::int64_t now_ns, std::int64_t mean_ns);
 
   const Descriptor listener_;
@@ -169,8 +169,8 @@ std::int64_t FaultProxy::Relay::drawn(std::int64_t now_ns, std::int64_t mean_ns)
   return now_ns + static_cast<std::int64_t>(wait(random_));
 }
 
-std::int64_t FaultProxy::Relay::stalled_until_ns(Way way) const {
-  return std::max(drawn_stall_end_ns_, now_.stalled_until_ns[way == Way::up ? 0 : 1]);
+std::int64_t FaultProxy::Relay::stalled_until_ns(RelayDirection way) const {
+  return std::max(drawn_stall_end_ns_, now_.stalled_until_ns[way == RelayDirection::up ? 0 : 1]);
 }
 
 void FaultProxy::Relay::loop() {
@@ -255,8 +255,8 @@ void FaultProxy::Relay::serve(RelayedConnection& connection, std::int64_t now_ns
   if (connection.client.ready != 0) read(connection.up, connection.client, now_ns);
   if (connection.target.ready != 0) read(connection.down, connection.target, now_ns);
   if (!connection.is_connecting)
-    write(connection, connection.up, connection.target, Way::up, now_ns);
-  write(connection, connection.down, connection.client, Way::down, now_ns);
+    write(connection, connection.up, connection.target, RelayDirection::up, now_ns);
+  write(connection, connection.down, connection.client, RelayDirection::down, now_ns);
   if (connection.up.told && connection.down.told) connection.is_over = true;
 }
 
@@ -275,8 +275,8 @@ void FaultProxy::Relay::read(Flow& flow, const End& from, std::int64_t now_ns) {
   }
 }
 
-void FaultProxy::Relay::write(RelayedConnection& connection, Flow& flow, const End& to, Way way,
-                              std::int64_t now_ns) {
+void FaultProxy::Relay::write(RelayedConnection& connection, Flow& flow, const End& to,
+                              RelayDirection way, std::int64_t now_ns) {
   if (connection.is_over || now_ns < stalled_until_ns(way)) return;
   flow.is_blocked = false;
   for (auto piece = flow.channel.due(now_ns); !piece.empty(); piece = flow.channel.due(now_ns)) {
@@ -286,7 +286,8 @@ void FaultProxy::Relay::write(RelayedConnection& connection, Flow& flow, const E
       flow.is_blocked = true;
       return;
     }
-    (way == Way::up ? done_.up_bytes : done_.down_bytes) += static_cast<std::uint64_t>(took);
+    (way == RelayDirection::up ? done_.up_bytes : done_.down_bytes) +=
+        static_cast<std::uint64_t>(took);
     flow.channel.took(static_cast<std::size_t>(took));
   }
   if (!flow.ended || flow.told || flow.channel.held() != 0) return;
@@ -300,7 +301,7 @@ void FaultProxy::Relay::wait() {
   if (accept_at_ns_ != INT64_MIN) wake_ns = std::min(wake_ns, accept_at_ns_);
   const bool accepts = connections_.size() < kConnections && accept_at_ns_ == INT64_MIN;
   polled_.assign({{event_.get(), POLLIN, 0}, {accepts ? listener_.get() : -1, POLLIN, 0}});
-  const auto interest = [&](const End& end, const Flow& from, const Flow& to, Way way) {
+  const auto interest = [&](const End& end, const Flow& from, const Flow& to, RelayDirection way) {
     short events = 0;
     if (!from.ended && from.channel.room(now_.how) != 0) events |= POLLIN;
     if (to.is_blocked) {
@@ -315,11 +316,11 @@ void FaultProxy::Relay::wait() {
     polled_.push_back({events == 0 ? -1 : end.socket.get(), events, 0});
   };
   for (const RelayedConnection& connection : connections_) {
-    interest(connection.client, connection.up, connection.down, Way::down);
+    interest(connection.client, connection.up, connection.down, RelayDirection::down);
     if (connection.is_connecting) {
       polled_.push_back({connection.target.socket.get(), POLLOUT, 0});
     } else {
-      interest(connection.target, connection.down, connection.up, Way::up);
+      interest(connection.target, connection.down, connection.up, RelayDirection::up);
     }
   }
   const std::int64_t left_ns = std::max<std::int64_t>(0, wake_ns - steady_now_ns());
@@ -364,12 +365,12 @@ void FaultProxy::change(const Impairment& how) {
   relay_->order([&](Relay::Orders& orders) { orders.how = how; });
 }
 
-void FaultProxy::stall(Way way, std::int64_t duration_ns) {
+void FaultProxy::stall(RelayDirection way, std::int64_t duration_ns) {
   const std::int64_t now_ns = steady_now_ns();
   const std::int64_t end_ns = duration_ns > kNever - now_ns ? kNever : now_ns + duration_ns;
   relay_->order([&](Relay::Orders& orders) {
-    if (way != Way::down) orders.stalled_until_ns[0] = end_ns;
-    if (way != Way::up) orders.stalled_until_ns[1] = end_ns;
+    if (way != RelayDirection::down) orders.stalled_until_ns[0] = end_ns;
+    if (way != RelayDirection::up) orders.stalled_until_ns[1] = end_ns;
   });
 }
 

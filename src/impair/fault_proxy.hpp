@@ -10,7 +10,7 @@
 
 namespace gimnet::impair {
 
-enum class Way : std::uint8_t {
+enum class RelayDirection : std::uint8_t {
   up,    ///< from who connects to the target
   down,  ///< back
   both
@@ -52,7 +52,7 @@ class FaultProxy {
   /// From the next byte on; what is under way keeps its times.
   void change(const Impairment& how);
   /// Nothing gets through for `duration_ns`; DelayedChannel::kNever: until go().
-  void stall(Way way, std::int64_t duration_ns);
+  void stall(RelayDirection way, std::int64_t duration_ns);
   void go();
   /// Ends all connections as a reset does; what was under way is lost.
   void cut();

@@ -135,7 +135,7 @@ TEST_F(FaultProxyTest, AStallHoldsOneWayUntilItIsLifted) {
   open({});
   const Descriptor client(dial());
   const Descriptor server(accept());
-  proxy_->stall(Way::up, DelayedChannel::kNever);
+  proxy_->stall(RelayDirection::up, DelayedChannel::kNever);
   say(client, "held");
   say(server, "free");
   EXPECT_EQ(hear(client, 4), "free");
@@ -149,7 +149,7 @@ TEST_F(FaultProxyTest, AnEndDuringAStallIsToldBehindIt) {
   open({});
   const Descriptor client(dial());
   const Descriptor server(accept());
-  proxy_->stall(Way::both, 50 * kMs);
+  proxy_->stall(RelayDirection::both, 50 * kMs);
   const std::int64_t begin = steady_now_ns();
   ::shutdown(client.get(), SHUT_WR);
   EXPECT_EQ(hear(server, 1), "");

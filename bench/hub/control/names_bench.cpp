@@ -34,7 +34,7 @@ struct World {
     JoinRequest request;
     request.name = name(i);
     request.description = "a robot";
-    request.origin = Origin{"tcp", "127.0.0.1:40000"};
+    request.origin = PeerAddress{"tcp", "127.0.0.1:40000"};
     Session& session = *membership.join(request, milliseconds{0}, effects)->session;
     note();
     return session;

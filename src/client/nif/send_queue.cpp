@@ -16,7 +16,8 @@ constexpr std::size_t kPassedOverMax = 15 * kTurnBytes;
 
 }  // namespace
 
-LatestStream latest_stream_of(const proto::FrameHeader& header, std::optional<std::uint64_t> key) {
+OutgoingStream latest_stream_of(const proto::FrameHeader& header,
+                                std::optional<std::uint64_t> key) {
   const std::uint64_t rest = (std::uint64_t{key.has_value()} << 16) |
                              (static_cast<std::uint64_t>(header.kind) << 8) | header.lane;
   return {(rest << 32) | header.dst, key.value_or(0)};
@@ -61,7 +62,7 @@ std::span<std::byte> SendQueue::append(std::uint8_t lane, std::size_t size) {
 }
 
 std::span<std::byte> SendQueue::append_latest(std::uint8_t lane, std::size_t size,
-                                              const LatestStream& stream) {
+                                              const OutgoingStream& stream) {
   GIMNET_CHECK(lane < lanes_.size() && size >= proto::kHeaderSize);
   Place place = allocate(size);
   const std::span<std::byte> memory{place.chunk->memory.get() + place.begin, size};

@@ -17,13 +17,13 @@
 namespace gimnet::nif {
 
 /// The stream of a LATEST message, which replaces an older one of it.
-struct LatestStream {
+struct OutgoingStream {
   std::uint64_t address = 0;  ///< dst, kind, lane, and whether there is a key
   std::uint64_t key = 0;
-  friend bool operator==(const LatestStream&, const LatestStream&) = default;
+  friend bool operator==(const OutgoingStream&, const OutgoingStream&) = default;
 };
-[[nodiscard]] LatestStream latest_stream_of(const proto::FrameHeader& header,
-                                            std::optional<std::uint64_t> key);
+[[nodiscard]] OutgoingStream latest_stream_of(const proto::FrameHeader& header,
+                                              std::optional<std::uint64_t> key);
 
 /// Frames on their way out: four lanes of frames that wait, the frames of one write under way, and,
 /// where resume is on, the frames that were written and not confirmed. A write is gather(), the
@@ -52,7 +52,7 @@ class SendQueue {
   /// allowed. A frame of any size has room in an empty queue.
   [[nodiscard]] bool has_room(std::size_t frame_size);
   /// An older frame of the stream waits and would be replaced: that needs no room.
-  [[nodiscard]] bool would_replace(const LatestStream& stream) const {
+  [[nodiscard]] bool would_replace(const OutgoingStream& stream) const {
     return latest_.contains(stream);
   }
 
@@ -61,7 +61,7 @@ class SendQueue {
   [[nodiscard]] std::span<std::byte> append(std::uint8_t lane, std::size_t size);
   /// The same for LATEST: in the place of the older frame of the stream, or at the end of the lane.
   [[nodiscard]] std::span<std::byte> append_latest(std::uint8_t lane, std::size_t size,
-                                                   const LatestStream& stream);
+                                                   const OutgoingStream& stream);
   /// Memory for a frame that goes before all lanes and is neither counted nor kept.
   [[nodiscard]] std::span<std::byte> append_control(std::size_t size);
 
@@ -106,7 +106,7 @@ class SendQueue {
 
  private:
   struct StreamHash {
-    std::size_t operator()(const LatestStream& stream) const noexcept {
+    std::size_t operator()(const OutgoingStream& stream) const noexcept {
       return static_cast<std::size_t>((stream.address ^ (stream.key * 0x9E3779B97F4A7C15ull)) *
                                       0xC2B2AE3D27D4EB4Full);
     }
@@ -135,7 +135,7 @@ class SendQueue {
   std::array<Runs, proto::kLaneCount> lanes_;
   std::array<std::size_t, proto::kLaneCount>
       passed_over_{};  ///< bytes that went while the lane waited
-  std::unordered_map<LatestStream, FrameRun*, StreamHash> latest_;
+  std::unordered_map<OutgoingStream, FrameRun*, StreamHash> latest_;
 
   Runs staged_;                    ///< gathered; outside a write at most the rest of one frame
   std::size_t staged_bytes_ = 0;   ///< without what was written of the first

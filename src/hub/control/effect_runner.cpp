@@ -76,7 +76,7 @@ void EffectRunner::run(const RenumberDue& effect) {
                                      effect.sentence});
 }
 
-void EffectRunner::run(const ServiceMoved& effect) {
+void EffectRunner::run(const ServiceChanged& effect) {
   tellings_.put(effect);
   tellings_.work_off(to_tell_);
 }
@@ -109,7 +109,7 @@ void EffectRunner::run(const SubscribersChanged& effect) {
   send_event(*session, tellings_.subscribers_event(*topic));
 }
 
-void EffectRunner::run(const NameLost& effect) {
+void EffectRunner::run(const NameLossDue& effect) {
   const Session* session = find(effect.node);
   if (session == nullptr) return;
   // The later half of the answer to the node's own request, which nobody could tell again.

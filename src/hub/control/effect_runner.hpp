@@ -57,14 +57,14 @@ class EffectRunner {
   void run(const MemberChanged& effect);
   void run(const SessionEnded& effect);
   void run(const RenumberDue& effect);
-  void run(const ServiceMoved& effect);
+  void run(const ServiceChanged& effect);
   void run(const PaceDue& effect);
   void run(const PaceEnded& effect);
   void run(const RetainedDropped& effect);
   void run(const SubscribersChanged& effect);
   void run(const CloseDue& effect);
   void run(const StateDue& effect);
-  void run(const NameLost& effect);
+  void run(const NameLossDue& effect);
   [[nodiscard]] const Session* find(NodeIndex node) const {
     return parts_.membership.sessions().find(node);
   }

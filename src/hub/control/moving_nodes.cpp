@@ -21,7 +21,7 @@ JoinRequest join_request_of(const Stranger& stranger, const proto::Hello& hello,
   request.rights = stranger.rights;
   request.description = hello.description;
   request.shard_hint = hello.shard;
-  request.origin = Origin{stranger.peer.transport, stranger.peer.address};
+  request.origin = PeerAddress{stranger.peer.transport, stranger.peer.address};
   // Root and the hub's own user need no bound: they can end the hub.
   if (!stranger.rights.administer)
     request.crowd = crowd_of(stranger.identity, stranger.peer.address);

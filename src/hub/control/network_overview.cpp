@@ -6,7 +6,9 @@
 namespace gimnet::hub {
 namespace {
 
-std::vector<HubView::Edge> edges_of(const HubRecord& record) {
+using proto::ctrl::LinkState;
+
+std::vector<HubView::Edge> edges_of(const StoredRecord& record) {
   std::vector<HubView::Edge> edges;
   record.each_counting([&edges](const StoredPart& part) {
     for (const auto& neighbour : part.said.neighbours)
@@ -23,7 +25,7 @@ std::vector<HubView> NetworkOverview::hubs() const {
   const auto view = [&](const proto::HubKey& key) {
     HubView hub;
     hub.hub = key.hub;
-    if (const HubRecord* record = store.find(key); record != nullptr) {
+    if (const StoredRecord* record = store.find(key); record != nullptr) {
       if (const auto* head = record->head(); head != nullptr) {
         hub.name = head->name;
         hub.version = head->version;

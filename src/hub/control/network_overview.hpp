@@ -42,7 +42,7 @@ class NetworkOverview final : public NetworkView {
 
  private:
   [[nodiscard]] LinkView view_of(const HubLink& link) const;
-  [[nodiscard]] LinkState state_of(const HubLink& link) const;
+  [[nodiscard]] proto::ctrl::LinkState state_of(const HubLink& link) const;
 
   const Parts parts_;
 };

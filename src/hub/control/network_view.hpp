@@ -7,24 +7,16 @@
 
 #include "base/ids.hpp"
 #include "hub/control/link_options.hpp"
+#include "proto/control/ctrl_network.hpp"
 
 namespace gimnet::hub {
-
-enum class LinkState : std::uint8_t {
-  dialling,  ///< there is no connection; this hub dials
-  away,      ///< the connection broke, and may be resumed
-  learning,  ///< connected; the records of the other side have not all come
-  standby,   ///< up, while another link to the same hub carries
-  damped,    ///< up, and not reported yet, since it broke too often
-  up,
-};
 
 /// A link as it is shown to people. A value type.
 struct LinkView {
   std::string name;
   HubId hub;         ///< at the other end; 0: not known
   std::string peer;  ///< the URL that is dialled, or where the other side came from
-  LinkState state = LinkState::dialling;
+  proto::ctrl::LinkState state = proto::ctrl::LinkState::dialling;
   bool dialled = false;              ///< by this hub
   std::uint16_t cost = 0;            ///< 0: not measured yet
   std::uint32_t rtt_us = 0;          ///< the lowest of this connection; 0: none yet

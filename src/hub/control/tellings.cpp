@@ -12,7 +12,7 @@ namespace gimnet::hub {
 
 namespace ns = proto::ns;
 
-void Tellings::put(const ServiceMoved& moved) {
+void Tellings::put(const ServiceChanged& moved) {
   const auto [entry, added] = waiting_.try_emplace(moved.full_name, false);
   entry->second |= moved.joins;
   if (added) order_.push_back(moved.full_name);

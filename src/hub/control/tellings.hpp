@@ -36,7 +36,7 @@ class Tellings {
 
   /// Its subscribers are to be told. A round that is under way is ended first: a service that moves
   /// again and again keeps nobody from being told.
-  void put(const ServiceMoved& moved);
+  void put(const ServiceChanged& moved);
   /// Events for that connection of the node were dropped, and it has taken all others.
   void put(NodeIndex node, std::uint32_t attachment);
   /// Tells so many subscribers at most, and counts `most` down; nodes that missed events once no

@@ -75,11 +75,11 @@ struct LinksRequest {
 };
 
 enum class LinkState : std::uint16_t {
-  dialling = 0,
-  away = 1,
-  learning = 2,
-  standby = 3,
-  damped = 4,
+  dialling = 0,  ///< there is no connection; this hub dials
+  away = 1,      ///< the connection broke, and may be resumed
+  learning = 2,  ///< connected; the records of the other side have not all come
+  standby = 3,   ///< up, while another link to the same hub carries
+  damped = 4,    ///< up, and not reported yet, since it broke too often
   up = 5,
 };
 /// The state as documents and tools print it, for example "up"; "unknown" for another value.

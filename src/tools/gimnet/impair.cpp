@@ -56,9 +56,9 @@ std::vector<std::string_view> words_of(std::string_view line) {
 std::string error(const std::string& sentence) { return "error: " + sentence; }
 
 std::string stall(impair::FaultProxy& proxy, std::span<const std::string_view> words) {
-  impair::Way way = impair::Way::both;
+  impair::RelayDirection way = impair::RelayDirection::both;
   if (!words.empty() && (words[0] == "up" || words[0] == "down")) {
-    way = words[0] == "up" ? impair::Way::up : impair::Way::down;
+    way = words[0] == "up" ? impair::RelayDirection::up : impair::RelayDirection::down;
     words = words.subspan(1);
   }
   if (words.size() > 1) return error("stall takes [up|down] [TIME]");

@@ -65,9 +65,9 @@ class Side {
       } else if (const auto* service = std::get_if<ServiceNoted>(&effect)) {
         watches.note(*service, membership, now);
         names.note(*service);
-      } else if (const auto* lost = std::get_if<NameLost>(&effect)) {
+      } else if (const auto* lost = std::get_if<NameLossDue>(&effect)) {
         lost_names.push_back(lost->name);
-      } else if (const auto* moved = std::get_if<ServiceMoved>(&effect)) {
+      } else if (const auto* moved = std::get_if<ServiceChanged>(&effect)) {
         moved_services.push_back(moved->full_name);
       }
     }

@@ -9,6 +9,7 @@
 namespace gimnet::hub {
 namespace {
 
+using proto::ctrl::LinkState;
 using std::chrono::milliseconds;
 
 TEST(NetworkOverview, ShowsHubsAndLinksOfBothEnds) {

@@ -184,7 +184,7 @@ void World::take_record(std::size_t wire, std::size_t hub, const Payload& bytes)
   hub::NetworkState& state = *hubs_[hub].state;
   const hub::PartRef part = hub::read_part(*bytes);
   const auto is_known = [&state, &part] {
-    const hub::HubRecord* record = state.store().find(part->said.hub);
+    const hub::StoredRecord* record = state.store().find(part->said.hub);
     const hub::StoredPart* known = record == nullptr ? nullptr : record->part(part->said.part);
     return known != nullptr && known->bytes == part->bytes;
   };

@@ -46,7 +46,7 @@ class Run {
       hub_.advance(now_);
       look();
     }
-    const HubRecord* own = hub_.store().find(hub_.self().key);
+    const StoredRecord* own = hub_.store().find(hub_.self().key);
     FUZZ_MUST(own != nullptr && own->head()->instance == hub_.self().instance);
     FUZZ_MUST(std::ranges::binary_search(hub_.map().reachable(), hub_.self().key));
   }

@@ -13,13 +13,6 @@ namespace ctrl = proto::ctrl;
 using proto::Refusal;
 using proto::Status;
 
-static_assert(static_cast<int>(ctrl::LinkState::dialling) == static_cast<int>(LinkState::dialling));
-static_assert(static_cast<int>(ctrl::LinkState::away) == static_cast<int>(LinkState::away));
-static_assert(static_cast<int>(ctrl::LinkState::learning) == static_cast<int>(LinkState::learning));
-static_assert(static_cast<int>(ctrl::LinkState::standby) == static_cast<int>(LinkState::standby));
-static_assert(static_cast<int>(ctrl::LinkState::damped) == static_cast<int>(LinkState::damped));
-static_assert(static_cast<int>(ctrl::LinkState::up) == static_cast<int>(LinkState::up));
-
 HubView own_view(const HandlerContext& context) {
   HubView own;
   own.hub = context.facts.id;
@@ -77,7 +70,7 @@ ctrl::LinkRecord record_of(const LinkView& link) {
   return {.name = link.name,
           .hub = link.hub,
           .peer = link.peer,
-          .state = static_cast<ctrl::LinkState>(link.state),
+          .state = link.state,
           .dialled = link.dialled,
           .cost = link.cost,
           .rtt_us = link.rtt_us,

@@ -53,7 +53,7 @@ struct RenumberDue {
 };
 /// Tell a service's subscribers what it is now, in pieces. `joins`: its group is new; each of them
 /// becomes a member, and is paced, once it was told.
-struct ServiceMoved {
+struct ServiceChanged {
   std::string full_name;
   bool joins = false;
 };
@@ -90,7 +90,7 @@ struct SubscribersChanged {
 struct StateDue {};
 
 /// Tell a node that a node of another hub has its name, or the full name of its service.
-struct NameLost {
+struct NameLossDue {
   NodeIndex node;
   std::string name;
   NodeId holder;
@@ -114,8 +114,8 @@ struct ServiceNoted {
 
 using Effect =
     std::variant<NodeChanged, GroupChanged, AwayGroupChanged, MemberChanged, SessionEnded,
-                 ServiceMoved, PaceDue, PaceEnded, RetainedDropped, SubscribersChanged, CloseDue,
-                 RenumberDue, StateDue, NameLost, NodeNoted, ServiceNoted>;
+                 ServiceChanged, PaceDue, PaceEnded, RetainedDropped, SubscribersChanged, CloseDue,
+                 RenumberDue, StateDue, NameLossDue, NodeNoted, ServiceNoted>;
 using Effects = std::vector<Effect>;
 
 }  // namespace gimnet::hub

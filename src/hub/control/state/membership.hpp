@@ -36,7 +36,7 @@ struct JoinRequest {
   Rights rights;                     ///< of the peer
   std::string description;
   std::optional<std::uint16_t> shard_hint;
-  Origin origin;
+  PeerAddress origin;
   std::string crowd;     ///< that the peer counts in: its address, or its user; "": none
   bool resumes = false;  ///< it asks for resume
   std::chrono::milliseconds wall{};  ///< since 1970: tokens expire by it

@@ -90,11 +90,11 @@ void Membership::lose_name(const std::string& name, NodeId holder, const std::st
                            milliseconds now, Effects& effects) {
   if (const auto index = directory_.find(name)) {
     take_name(*sessions_.find(*index), "", now, effects);
-    effects.emplace_back(NameLost{*index, name, holder, sentence});
+    effects.emplace_back(NameLossDue{*index, name, holder, sentence});
   } else if (const Topic* topic = services_.find(name); topic != nullptr && topic->provided()) {
     const NodeIndex provider = topic->service->provider;
     if (!services_.withdraw(provider, topic->service->group, now, effects))
-      effects.emplace_back(NameLost{provider, name, holder, sentence});
+      effects.emplace_back(NameLossDue{provider, name, holder, sentence});
   }
 }
 

@@ -28,7 +28,7 @@ void put_state(ns::ServiceState& state, const HubTitle& hub, const Topic& topic,
       return put_state(state, *known);
   }
   if (!topic.service) return;
-  const Service& service = *topic.service;
+  const LocalService& service = *topic.service;
   const Session* provider = membership.sessions().find(service.provider);
   state.group = make_id(hub.id, service.group);
   if (provider != nullptr) {
@@ -43,7 +43,7 @@ void put_state(ns::ServiceState& state, const HubTitle& hub, const Topic& topic,
 }
 
 ns::ServiceRecord record_of(const HubTitle& hub, const Topic& topic) {
-  const Service& service = *topic.service;
+  const LocalService& service = *topic.service;
   ns::ServiceRecord record;
   record.group = make_id(hub.id, service.group);
   record.name = std::string{topic.full_name};

@@ -90,7 +90,7 @@ Result<Services::Advertised, proto::Refusal> Services::advertise(NodeIndex provi
   }
   Topic& entry = topic(full_name);  // not before: a topic may have gone for its group
   if (group) {
-    enter_group(entry, Service{*group, provider, terms}, now, effects);
+    enter_group(entry, LocalService{*group, provider, terms}, now, effects);
   } else if (!provided) {
     take_over(entry, provider, terms, effects);
   } else if (entry.service->terms.metadata != terms.metadata) {

@@ -33,7 +33,7 @@ struct ServiceTerms {
 };
 
 /// A group id stands for a full name with its terms, whoever provides it.
-struct Service {
+struct LocalService {
   GroupIndex group;
   NodeIndex provider;  ///< kNobody: nobody at the moment
   ServiceTerms terms;  ///< the latest provider's
@@ -52,7 +52,7 @@ struct AwayService {
 /// A full name that somebody provides, or waits for, or that still has a group id.
 struct Topic {
   std::string_view full_name;
-  std::optional<Service> service;                        ///< nothing: no group id here
+  std::optional<LocalService> service;                   ///< nothing: no group id here
   std::optional<AwayService> away;                       ///< only without `service`
   std::vector<NodeIndex> subscribers;                    ///< ascending
   std::unordered_map<NodeIndex, SubscriberTerms> terms;  ///< of those that asked for something
@@ -150,7 +150,7 @@ class Services {
   /// So many links lead to subscribers of that group of this hub.
   void set_links(GroupIndex group, std::uint32_t links, Effects& effects);
 
-  /// Grows with each ServiceMoved.
+  /// Grows with each ServiceChanged.
   [[nodiscard]] std::uint64_t changes() const { return changes_; }
   /// The node's subscriptions that had news for subscribers since that change, the latest last.
   [[nodiscard]] std::vector<const Topic*> moved_since(NodeIndex node, std::uint64_t change) const;
@@ -206,7 +206,7 @@ class Services {
   /// A group that no other name has; the oldest ones that nobody provides make room.
   [[nodiscard]] std::optional<GroupIndex> take_group(std::chrono::milliseconds now,
                                                      Effects& effects);
-  void enter_group(Topic& topic, const Service& service, std::chrono::milliseconds now,
+  void enter_group(Topic& topic, const LocalService& service, std::chrono::milliseconds now,
                    Effects& effects);
   void begin_away(Topic& topic, const AwayService& away, Effects& effects);
   void end_away(Topic& topic, Effects& effects);

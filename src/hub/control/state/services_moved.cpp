@@ -25,9 +25,9 @@ std::optional<GroupIndex> Services::take_group(milliseconds now, Effects& effect
 }
 
 /// A name has a group that it had not before: a new name, or other terms.
-void Services::enter_group(Topic& topic, const Service& service, milliseconds now,
+void Services::enter_group(Topic& topic, const LocalService& service, milliseconds now,
                            Effects& effects) {
-  const std::optional<Service> former = topic.service;
+  const std::optional<LocalService> former = topic.service;
   if (topic.away) end_away(topic, effects);
   if (topic.provided()) effects.emplace_back(service_noted(ChangeKind::withdrawn, topic));
   if (former) leave_group(topic, now, effects);
@@ -143,7 +143,7 @@ void Services::begin_pace(const Topic& topic, NodeIndex subscriber, Effects& eff
 void Services::tell_subscribers(Topic& topic, Effects& effects, bool joins) {
   if (topic.subscribers.empty()) return;
   topic.change = ++changes_;
-  effects.emplace_back(ServiceMoved{std::string{topic.full_name}, joins});
+  effects.emplace_back(ServiceChanged{std::string{topic.full_name}, joins});
 }
 
 /// Another hub's service replaces a group of this hub that nobody provides. A group id that two

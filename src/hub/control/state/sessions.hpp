@@ -75,7 +75,7 @@ class Crowds {
 
 /// The origin of a connection, as people read it: "tcp" and "127.0.0.1:41234", or "unix" and "pid
 /// 77 uid 1000".
-struct Origin {
+struct PeerAddress {
   CompactText transport;
   CompactText address;
 };
@@ -102,7 +102,7 @@ struct Session {
   CompactText description;
   Identity identity;                         ///< who its peer is; nobody else can claim it
   CompactText token_name;                    ///< for which its latest token was written
-  Origin origin;                             ///< of the latest connection
+  PeerAddress origin;                        ///< of the latest connection
   Crowds::Entry* crowd = nullptr;            ///< in which it counts; null: in none
   std::chrono::milliseconds token_expiry{};  ///< since 1970
   std::uint64_t change_seen = 0;             ///< of services, when its latest connection began

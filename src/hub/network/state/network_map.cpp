@@ -114,7 +114,7 @@ class ShortestWays {
 
 }  // namespace
 
-std::optional<HubIdentity> identity_of(const HubRecord& record) {
+std::optional<HubIdentity> identity_of(const StoredRecord& record) {
   const auto* head = record.head();
   if (head == nullptr) return std::nullopt;
   return HubIdentity{head->hub, head->instance, head->configured};

@@ -66,6 +66,6 @@ class NetworkMap {
 };
 
 /// The identity that a record tells. Nothing: its part 0 is not known.
-[[nodiscard]] std::optional<HubIdentity> identity_of(const HubRecord& record);
+[[nodiscard]] std::optional<HubIdentity> identity_of(const StoredRecord& record);
 
 }  // namespace gimnet::hub

@@ -71,7 +71,7 @@ void NetworkState::take_record(LinkNumber number, proto::Payload bytes,
     ++malformed_;
     return;
   }
-  const HubRecord* record = store_.find(part->said.hub);
+  const StoredRecord* record = store_.find(part->said.hub);
   const StoredPart* known = record == nullptr ? nullptr : record->part(part->said.part);
   const bool is_own = part->said.hub == own_.identity().key;
   if (!is_own && known != nullptr && !is_newer(part->said, known->said)) return;

@@ -52,17 +52,17 @@ bool is_newer(const RecordPart& part, const RecordPart& than) {
   return higher == (apart <= kFarApart);
 }
 
-const StoredPart* HubRecord::part(std::uint16_t number) const {
+const StoredPart* StoredRecord::part(std::uint16_t number) const {
   const auto found = place_of(parts_, number);
   return found != parts_.end() && (*found)->said.part == number ? found->get() : nullptr;
 }
 
-const RecordPart* HubRecord::head() const {
+const RecordPart* StoredRecord::head() const {
   const StoredPart* first = part(0);
   return first == nullptr ? nullptr : &first->said;
 }
 
-void HubRecord::put(PartRef part) {
+void StoredRecord::put(PartRef part) {
   const auto number = part->said.part;
   const auto at = parts_.begin() + (place_of(parts_, number) - parts_.cbegin());
   if (at != parts_.end() && (*at)->said.part == number) {
@@ -104,7 +104,7 @@ bool RecordStore::has_room_for(HubId hub) const {
   return static_cast<std::size_t>(std::distance(first, end)) < kRecordsOfOneId;
 }
 
-const HubRecord* RecordStore::find(const proto::HubKey& hub) const {
+const StoredRecord* RecordStore::find(const proto::HubKey& hub) const {
   const auto found = records_.find(hub);
   return found == records_.end() ? nullptr : &found->second;
 }

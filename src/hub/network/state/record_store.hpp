@@ -34,7 +34,7 @@ using PartRef = std::shared_ptr<const StoredPart>;
 
 /// The record of one hub: its parts by number. Part 0 names the instance that counts; parts of
 /// another instance do not count.
-class HubRecord {
+class StoredRecord {
  public:
   /// Null: that part is not known.
   [[nodiscard]] const StoredPart* part(std::uint16_t number) const;
@@ -77,9 +77,9 @@ class RecordStore {
   /// Keeps what this hub says of itself: others cannot take its place away.
   void put_own(const PartRef& part);
 
-  [[nodiscard]] const std::map<proto::HubKey, HubRecord>& records() const { return records_; }
+  [[nodiscard]] const std::map<proto::HubKey, StoredRecord>& records() const { return records_; }
   /// Null: it is not known.
-  [[nodiscard]] const HubRecord* find(const proto::HubKey& hub) const;
+  [[nodiscard]] const StoredRecord* find(const proto::HubKey& hub) const;
   /// All parts of all records, in the order of the hubs.
   [[nodiscard]] std::vector<PartRef> all() const;
 
@@ -95,8 +95,8 @@ class RecordStore {
  private:
   [[nodiscard]] bool has_room_for(HubId hub) const;
 
-  std::map<proto::HubKey, HubRecord> records_;  ///< Limit: kRecordsOfOneId for each hub id
-  std::size_t bytes_ = 0;                       ///< of the parts of other hubs
+  std::map<proto::HubKey, StoredRecord> records_;  ///< Limit: kRecordsOfOneId for each hub id
+  std::size_t bytes_ = 0;                          ///< of the parts of other hubs
   std::uint64_t too_many_ = 0;
 };
 

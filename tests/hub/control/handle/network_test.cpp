@@ -132,7 +132,7 @@ TEST_F(NetworkHandlerTest, HubsComeInPages) {
 }
 
 TEST_F(NetworkHandlerTest, LinksAreToldByTheirNamesInPages) {
-  LinkView up{.name = "b", .hub = HubId{3}, .peer = "tcp://h:1", .state = LinkState::up};
+  LinkView up{.name = "b", .hub = HubId{3}, .peer = "tcp://h:1", .state = ctrl::LinkState::up};
   up.dialled = true;
   up.cost = 12;
   up.rtt_us = 80;

@@ -17,7 +17,7 @@ class DirectoryTest : public ::testing::Test {
     EXPECT_TRUE(created);
     Session& session = **created;
     session.name = name;
-    session.origin = Origin{"tcp", "127.0.0.1:5000"};
+    session.origin = PeerAddress{"tcp", "127.0.0.1:5000"};
     sessions_.attach(session, 0ms);
     directory_.put(name, session.index);
     return session;

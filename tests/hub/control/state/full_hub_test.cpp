@@ -46,7 +46,7 @@ class FullHub : public ::testing::Test {
   static JoinRequest request(const std::string& name) {
     JoinRequest result;
     result.name = name;
-    result.origin = Origin{"tcp", "127.0.0.1:1"};
+    result.origin = PeerAddress{"tcp", "127.0.0.1:1"};
     result.identity = Identity::open();
     return result;
   }

@@ -49,7 +49,7 @@ TEST_F(MembershipNamesTest, ANewNameWithdrawsWhatTheNodeProvides) {
   ASSERT_TRUE(membership_.services().subscribe(robot->index, "viewer/pose", {}, effects_));
   effects_.clear();
   ASSERT_FALSE(membership_.rename(*robot, "forklift", 1s, effects_));
-  ASSERT_EQ(count<ServiceMoved>(), 1u);
+  ASSERT_EQ(count<ServiceChanged>(), 1u);
   EXPECT_EQ(membership_.services().services_of(robot->index), 0u);
   EXPECT_EQ(membership_.services().provided(), 0u);
   EXPECT_EQ(membership_.services().topics(), 2u) << "both subscriptions wait on";

@@ -134,11 +134,11 @@ TEST_F(MembershipNetworkTest, ANodeThatLosesItsNameGoesOnAndAServiceEnds) {
   effects_.clear();
   membership_.lose_name("robot/laser", NodeId{9}, "it was first", 1s, effects_);
   EXPECT_EQ(membership_.services().provided(), 0u);
-  EXPECT_EQ(std::get<NameLost>(effects_.back()).name, "robot/laser");
+  EXPECT_EQ(std::get<NameLossDue>(effects_.back()).name, "robot/laser");
   membership_.lose_name("robot", NodeId{9}, "it was first", 1s, effects_);
   EXPECT_EQ(node->name, "") << "it goes on, by its id";
   EXPECT_FALSE(membership_.directory().find("robot"));
-  EXPECT_EQ(std::get<NameLost>(effects_.back()).node, node->index);
+  EXPECT_EQ(std::get<NameLossDue>(effects_.back()).node, node->index);
   effects_.clear();
   membership_.lose_name("nobody", NodeId{9}, "", 1s, effects_);
   EXPECT_TRUE(effects_.empty());

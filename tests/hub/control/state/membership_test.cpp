@@ -191,7 +191,7 @@ TEST_F(MembershipTest, ServicesStayThroughTheGraceTimeAndGoWithIt) {
   effects_.clear();
   membership_.tick(1s + kGrace, effects_);
   EXPECT_FALSE(membership_.services().find_group(GroupIndex{1})->provided());
-  EXPECT_EQ(count<ServiceMoved>(), 1u);
+  EXPECT_EQ(count<ServiceChanged>(), 1u);
 }
 
 TEST_F(MembershipTest, WhatAReturnedNodeDoesNotDeclareAgainIsDropped) {

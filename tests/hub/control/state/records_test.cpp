@@ -15,7 +15,7 @@ TEST(Records, TellAllThatIsKnown) {
   JoinRequest request;
   request.name = "robot";
   request.description = "forklift";
-  request.origin = Origin{"tcp", "127.0.0.1:1"};
+  request.origin = PeerAddress{"tcp", "127.0.0.1:1"};
   Effects effects;
   const Session& session = *membership.join(request, 1s, effects)->session;
   ServiceTerms terms;

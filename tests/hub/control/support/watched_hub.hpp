@@ -21,7 +21,7 @@ class WatchedHub {
   Session& join(const std::string& name) {
     JoinRequest request;
     request.name = name;
-    request.origin = Origin{"tcp", "127.0.0.1:5000"};
+    request.origin = PeerAddress{"tcp", "127.0.0.1:5000"};
     Effects effects;
     Session& session = *membership.join(request, now, effects)->session;
     note(effects);

@@ -20,7 +20,7 @@ class MembershipTest : public ::testing::Test {
   JoinRequest request(const std::string& name) {
     JoinRequest result;
     result.name = name;
-    result.origin = Origin{"tcp", "127.0.0.1:1"};
+    result.origin = PeerAddress{"tcp", "127.0.0.1:1"};
     result.identity = Identity::open();
     return result;
   }

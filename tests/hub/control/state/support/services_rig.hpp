@@ -47,7 +47,7 @@ inline std::vector<std::string> words(const Effects& effects, const Services& se
     } else if (const auto* member = std::get_if<MemberChanged>(&effect)) {
       result.push_back("member " + std::to_string(member->subscriber.value()) + " of " +
                        std::to_string(index_of(member->group)));
-    } else if (const auto* moved = std::get_if<ServiceMoved>(&effect)) {
+    } else if (const auto* moved = std::get_if<ServiceChanged>(&effect)) {
       result.push_back("moved " + moved->full_name + (moved->joins ? ", joins" : ""));
     } else if (const auto* change = std::get_if<SubscribersChanged>(&effect)) {
       result.push_back("subscribers " + change->full_name);
