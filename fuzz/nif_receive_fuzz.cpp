@@ -137,7 +137,7 @@ Inbound::Verdict feed(Inbound& inbound, std::span<const std::byte> bytes, std::s
 }
 
 void check_connection(std::span<const std::byte> bytes, std::size_t step) {
-  Session session;
+  SessionTerms session;
   session.id = kOwnId;
   session.resume = true;
   session.hub_resume_bytes = 1024;
@@ -179,7 +179,7 @@ std::array<std::vector<std::byte>, 2> good_fragments(std::uint32_t number) {
 /// Frames of another node never end a connection, whatever is in them, and cost no third node a
 /// message.
 void check_strangers(std::span<const std::byte> bytes, std::size_t step) {
-  Session session;
+  SessionTerms session;
   session.id = kOwnId;
   Witness witness;
   Inbound inbound(kLimits, witness);
@@ -217,10 +217,10 @@ void check_handshake(std::span<const std::byte> bytes, std::size_t step) {
   FUZZ_MUST(state != net::DialHandshake::State::failed || !whole.error().sentence.empty());
   if (state != net::DialHandshake::State::welcome) return;
   FUZZ_MUST(whole.welcome() == split.welcome());
-  const auto checked = session_of(whole.welcome(), true, 0x1234);
+  const auto checked = session_terms_of(whole.welcome(), true, 0x1234);
   FUZZ_MUST(checked || !checked.error().sentence.empty());
   if (!checked) return;
-  const Session& session = *checked;
+  const SessionTerms& session = *checked;
   FUZZ_MUST(hub_of(NodeId{session.id}).value() == session.hub_id && !session.token.empty());
   FUZZ_MUST(session.keep_alive_ns > 0 && session.silent_after_ns >= 2 * session.keep_alive_ns);
   FUZZ_MUST(session.frame_bytes_max <= proto::kFrameLengthDefault);

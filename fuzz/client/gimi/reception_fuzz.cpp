@@ -45,7 +45,7 @@ class World final : public nif::InboundHost {
             kMessageBytesMax),
         queue_(inbox_.queue(kKey, nullptr)),
         inbound_(kLimits, *this) {
-    nif::Session session;
+    nif::SessionTerms session;
     session.id = kOwnId;
     inbound_.begin(session);
   }

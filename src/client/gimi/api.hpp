@@ -62,7 +62,8 @@ struct Source : Object {
 struct SubscriptionObject final : Source {
   static constexpr HandleKind kKind = HandleKind::subscription;
   SubscriptionObject(SharedCore the_core, ServiceTable::Reading the_reading)
-      : Source(std::move(the_core), the_reading.reader->queue), reading(std::move(the_reading)) {}
+      : Source(std::move(the_core), the_reading.subscriber->queue),
+        reading(std::move(the_reading)) {}
   ~SubscriptionObject() override { core->services().unsubscribe(reading); }
   [[nodiscard]] SubscribedService& service() const { return *reading.service; }
   const ServiceTable::Reading reading;
@@ -83,7 +84,7 @@ struct SenderObject final : Object {
 
 struct WatchObject final : Object {
   static constexpr HandleKind kKind = HandleKind::watch;
-  WatchObject(SharedCore the_core, WatchTable::Begun the_watch)
+  WatchObject(SharedCore the_core, WatchQueues::Begun the_watch)
       : core(std::move(the_core)), watch(std::move(the_watch)) {}
   ~WatchObject() override { core->watches().unwatch(watch.number); }
   void end() override { watch.queue->end({Status::closed, "the watch was closed"}); }
@@ -92,7 +93,7 @@ struct WatchObject final : Object {
     return true;
   }
   const SharedCore core;
-  const WatchTable::Begun watch;
+  const WatchQueues::Begun watch;
 };
 
 /// Runs `body` so that no exception crosses into C.

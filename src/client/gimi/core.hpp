@@ -17,7 +17,7 @@
 #include "client/gimi/service_table.hpp"
 #include "client/gimi/stream_table.hpp"
 #include "client/gimi/uplink.hpp"
-#include "client/gimi/watch_table.hpp"
+#include "client/gimi/watch_queues.hpp"
 
 namespace gimnet::gimi {
 
@@ -41,7 +41,7 @@ class Core {
   [[nodiscard]] Inbox& inbox() { return inbox_; }
   [[nodiscard]] StreamTable& streams() { return streams_; }
   [[nodiscard]] ServiceTable& services() { return services_; }
-  [[nodiscard]] WatchTable& watches() { return watches_; }
+  [[nodiscard]] WatchQueues& watches() { return watches_; }
   [[nodiscard]] OpenRequests& requests() { return requests_; }
   [[nodiscard]] AnswerTable& answers() { return answers_; }
   /// Something is to be looked after at certain times.
@@ -67,7 +67,7 @@ class Core {
   Inbox inbox_;
   StreamTable streams_;
   ServiceTable services_;
-  WatchTable watches_;
+  WatchQueues watches_;
   OpenRequests requests_;
   AnswerTable answers_;
   PingTable pings_;

@@ -168,7 +168,7 @@ SendCounts SendStream::counts() {
   return counts;
 }
 
-void SendStream::settle_freed(const SendWindow::Freed& freed, const Loss& why) {
+void SendStream::settle_freed(const AckWindow::Freed& freed, const Loss& why) {
   if (!freed.any()) return;
   counts_.acknowledged += freed.acknowledged;
   counts_.lost += freed.lost;
@@ -182,7 +182,7 @@ void SendStream::settle_freed(const SendWindow::Freed& freed, const Loss& why) {
 bool SendStream::on_ack(std::uint32_t sequence, const proto::gimi::Ack& ack) {
   const MutexLock lock(mutex_);
   const bool answers = ack.pong_sequence != 0 && ack.pong_sequence == window_.ping_number();
-  const SendWindow::Freed freed =
+  const AckWindow::Freed freed =
       window_.acknowledge(sequence, ack.bitmap, ack.pong_sequence, steady_now_ns());
   const Loss& doubt = asked_ ? asked_ : doubt_;
   settle_freed(freed, doubt ? doubt
@@ -212,7 +212,7 @@ void SendStream::on_doubt(const Loss& why) {
 }
 
 void SendStream::lose_all(const Loss& why) {
-  SendWindow::Freed freed = window_.lose_all();
+  AckWindow::Freed freed = window_.lose_all();
   if (std::exchange(held_, std::nullopt)) ++freed.lost;
   settle_freed(freed, why);
   forget_doubts();

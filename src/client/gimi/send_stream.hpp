@@ -6,10 +6,10 @@
 #include <vector>
 
 #include "base/mutex.hpp"
+#include "client/gimi/ack_window.hpp"
 #include "client/gimi/clerk.hpp"
 #include "client/gimi/ending.hpp"
 #include "client/gimi/loss_tally.hpp"
-#include "client/gimi/send_window.hpp"
 #include "client/gimi/uplink.hpp"
 #include "gimnet/gimi/handles.hpp"
 
@@ -120,7 +120,7 @@ class SendStream {
   void forget_doubts() GIMNET_REQUIRES(mutex_);
   /// REQUIRES: something was lost.
   [[nodiscard]] Failure loss() const GIMNET_REQUIRES(mutex_);
-  void settle_freed(const SendWindow::Freed& freed, const Loss& why) GIMNET_REQUIRES(mutex_);
+  void settle_freed(const AckWindow::Freed& freed, const Loss& why) GIMNET_REQUIRES(mutex_);
   void watch_if_needed() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::string target() const { return service_.empty() ? to_.text() : service_; }
 
@@ -134,7 +134,7 @@ class SendStream {
   Condition changed_;
   ServicePlace place_ GIMNET_GUARDED_BY(mutex_);  ///< of a stream to a service
   Destination destination_ GIMNET_GUARDED_BY(mutex_);
-  SendWindow window_ GIMNET_GUARDED_BY(mutex_);
+  AckWindow window_ GIMNET_GUARDED_BY(mutex_);
   SendCounts counts_ GIMNET_GUARDED_BY(mutex_);
   std::optional<std::vector<std::byte>> held_ GIMNET_GUARDED_BY(mutex_);
   bool sending_ GIMNET_GUARDED_BY(mutex_) = false;  ///< one thread is between a sequence and NIF

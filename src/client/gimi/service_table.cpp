@@ -184,13 +184,13 @@ Outcome<ServiceTable::Reading> ServiceTable::subscribe(const std::string& full_n
   nif_status status = ask(service, wish.timeout);
   const bool ended = status == NIF_OK && !is_first && service->retained;
   if (ended) {
-    // The hub gives the last message to who begins, and this reader does.
+    // The hub gives the last message to who begins, and this subscriber does.
     static_cast<void>(nif_unsubscribe(uplink_.node(), full_name.c_str(), kLeaveTimeoutMs));
     status = ask(service, wish.timeout);
   }
   if (status != NIF_OK) {
     auto failure = failure_of(status, "subscribe " + full_name);
-    service->remove(*reading.reader);
+    service->remove(*reading.subscriber);
     // As before: the hub does not know this one.
     if (ended) {
       const nif_status again = ask(service, Timeout{kLeaveTimeoutMs});
@@ -216,7 +216,7 @@ void ServiceTable::unsubscribe(const Reading& reading) {
 void ServiceTable::leave(const Reading& reading) {
   const Subscribed& service = reading.service;
   const Share before = service->share();
-  service->remove(*reading.reader);
+  service->remove(*reading.subscriber);
   // If the hub is not told in time, because of a break, NIF tells it with the next connection.
   if (service->is_read() || service->followed) {
     if (service->share() == before) return;

@@ -46,12 +46,12 @@ class ServiceTable {
   using Subscribed = std::shared_ptr<SubscribedService>;
   struct Reading {
     Subscribed service;
-    SubscribedService::SharedReader reader;
+    SubscribedService::SharedSubscriber subscriber;
   };
   [[nodiscard]] Outcome<Reading> subscribe(const std::string& full_name,
                                            const SubscribeOptions& wish)
       GIMNET_EXCLUDES(asking_, mutex_);
-  /// With the last reader of a service the subscription ends.
+  /// With the last subscriber of a service the subscription ends.
   void unsubscribe(const Reading& reading) GIMNET_EXCLUDES(asking_, mutex_);
   /// Services that are subscribed or sent to now.
   [[nodiscard]] std::size_t subscriptions() GIMNET_EXCLUDES(mutex_) {
@@ -114,7 +114,7 @@ class ServiceTable {
     return open_ != 0 ? Place::not_yet : Place::unknown;
   }
   [[nodiscard]] Subscribed entry(const std::string& full_name) GIMNET_EXCLUDES(mutex_);
-  /// Asks the hub for what all readers want.
+  /// Asks the hub for what all subscribers want.
   [[nodiscard]] nif_status ask(const Subscribed& service, Timeout timeout) GIMNET_REQUIRES(asking_)
       GIMNET_EXCLUDES(mutex_);
   void leave(const Reading& reading) GIMNET_REQUIRES(asking_) GIMNET_EXCLUDES(mutex_);

@@ -168,7 +168,7 @@ void PublishedService::end(const Ending& ending) {
   changed_.notify_all();
 }
 
-Share Reader::share() const {
+Share Subscriber::share() const {
   // With one message in the queue and another one on its way the one in the queue never gets old.
   constexpr std::uint32_t kNewestWindow = 2;
   Share wanted{wish.window, std::max(1u, wish.depth), wish.rate_hz};
@@ -176,36 +176,37 @@ Share Reader::share() const {
   return wanted;
 }
 
-QueueOptions Reader::queue_options(bool latest) const {
+QueueOptions Subscriber::queue_options(bool latest) const {
   if (wish.newest_only || (wish.queue == 0 && (latest || wish.rate_hz > 0.0)))
     return {1, AtFullQueue::overwrite_oldest};
   return {wish.queue, wish.at_full};
 }
 
-SubscribedService::SharedReader SubscribedService::add(const SubscribeOptions& wish) {
+SubscribedService::SharedSubscriber SubscribedService::add(const SubscribeOptions& wish) {
   const MutexLock lock(mutex_);
-  auto reader = std::make_shared<Reader>(inbox_, wish, latest_);
-  reader->missed_before = missed_;
-  readers_.push_back(reader);
-  return reader;
+  auto subscriber = std::make_shared<Subscriber>(inbox_, wish, latest_);
+  subscriber->missed_before = missed_;
+  subscribers_.push_back(subscriber);
+  return subscriber;
 }
 
-void SubscribedService::remove(const Reader& reader) {
+void SubscribedService::remove(const Subscriber& subscriber) {
   const MutexLock lock(mutex_);
-  std::erase_if(readers_, [&reader](const SharedReader& each) { return each.get() == &reader; });
-  if (readers_.empty()) last_ = counted_ = {};
+  std::erase_if(subscribers_,
+                [&subscriber](const SharedSubscriber& each) { return each.get() == &subscriber; });
+  if (subscribers_.empty()) last_ = counted_ = {};
 }
 
 bool SubscribedService::is_read() {
   const MutexLock lock(mutex_);
-  return !readers_.empty();
+  return !subscribers_.empty();
 }
 
 Share SubscribedService::share() {
   const MutexLock lock(mutex_);
   std::optional<Share> widest;
-  for (const SharedReader& reader : readers_) {
-    const Share one = reader->share();
+  for (const SharedSubscriber& subscriber : subscribers_) {
+    const Share one = subscriber->share();
     if (!widest) widest = one;
     const bool unbound = one.window == 0 || widest->window == 0;
     widest->window = unbound ? 0 : std::max(widest->window, one.window);
@@ -216,9 +217,9 @@ Share SubscribedService::share() {
   return widest.value_or(Share{});
 }
 
-std::uint64_t SubscribedService::missed(const Reader& reader) {
+std::uint64_t SubscribedService::missed(const Subscriber& subscriber) {
   const MutexLock lock(mutex_);
-  return missed_ - reader.missed_before;
+  return missed_ - subscriber.missed_before;
 }
 
 bool SubscribedService::exists() {
@@ -289,23 +290,25 @@ SubscribedService::Put SubscribedService::put(const std::optional<Position>& pos
                                               Message& message) {
   const MutexLock lock(mutex_);
   const bool repeated = position && position->sequence != 0 && *position == last_;
-  // After a break, and for a reader more, the hub gives the last message of a retained service
+  // After a break, and for a subscriber more, the hub gives the last message of a retained service
   // again: it does not know who had it.
-  const auto wants = [repeated](const SharedReader& reader) { return !repeated || !reader->begun; };
-  const auto wanted = std::ranges::count_if(readers_, wants);
+  const auto wants = [repeated](const SharedSubscriber& subscriber) {
+    return !repeated || !subscriber->begun;
+  };
+  const auto wanted = std::ranges::count_if(subscribers_, wants);
   if (wanted == 0) return Put::unwanted;
   if (position && !repeated) count_missed(*position);
   bool kept = false;
   if (wanted == 1) {
-    kept = inbox_.put((*std::ranges::find_if(readers_, wants))->queue, message, nullptr);
+    kept = inbox_.put((*std::ranges::find_if(subscribers_, wants))->queue, message, nullptr);
   } else {
     std::vector<MessageQueue*> queues;
-    for (const SharedReader& reader : readers_)
-      if (wants(reader)) queues.push_back(&reader->queue);
+    for (const SharedSubscriber& subscriber : subscribers_)
+      if (wants(subscriber)) queues.push_back(&subscriber->queue);
     kept = inbox_.put_in_all(queues, message);
   }
   if (!kept) return Put::no_room;
-  for (const SharedReader& reader : readers_) reader->begun = true;
+  for (const SharedSubscriber& subscriber : subscribers_) subscriber->begun = true;
   if (position) take(*position);
   return Put::kept;
 }
@@ -335,8 +338,8 @@ void SubscribedService::on_place(const ServicePlace& now) {
   accepts_ = now.destination() != 0 && now.accepts;
   answers_ = accepts_ && now.key.type == proto::gimi::kRequestType;
   if (now.group != 0 && std::exchange(latest_, now.latest) != now.latest) {
-    for (const SharedReader& reader : readers_)
-      inbox_.set(reader->queue, reader->queue_options(latest_));
+    for (const SharedSubscriber& subscriber : subscribers_)
+      inbox_.set(subscriber->queue, subscriber->queue_options(latest_));
   }
   refusal_.reset();
   changed_.notify_all();

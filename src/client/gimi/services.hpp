@@ -96,12 +96,12 @@ struct Share {
 
 /// One subscribe() of a program: what it wants, and the queue of its messages. Lifetime: the inbox
 /// outlives it.
-struct Reader {
-  Reader(Inbox& inbox, const SubscribeOptions& options, bool latest)
+struct Subscriber {
+  Subscriber(Inbox& inbox, const SubscribeOptions& options, bool latest)
       : wish(options), queue(inbox.add_queue(queue_options(latest), options.silence)) {}
-  ~Reader() { queue.inbox().remove(queue); }
-  Reader(const Reader&) = delete;
-  Reader& operator=(const Reader&) = delete;
+  ~Subscriber() { queue.inbox().remove(queue); }
+  Subscriber(const Subscriber&) = delete;
+  Subscriber& operator=(const Subscriber&) = delete;
 
   [[nodiscard]] Share share() const;
   /// `latest`: of a service with that delivery.
@@ -126,16 +126,16 @@ class SubscribedService {
 
   // ---- who reads it
 
-  using SharedReader = std::shared_ptr<Reader>;
+  using SharedSubscriber = std::shared_ptr<Subscriber>;
   /// Messages come into its queue from now on.
-  [[nodiscard]] SharedReader add(const SubscribeOptions& wish) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] SharedSubscriber add(const SubscribeOptions& wish) GIMNET_EXCLUDES(mutex_);
   /// Nothing comes into its queue any more.
-  void remove(const Reader& reader) GIMNET_EXCLUDES(mutex_);
+  void remove(const Subscriber& subscriber) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] bool is_read() GIMNET_EXCLUDES(mutex_);
-  /// As much as the reader wants that wants most.
+  /// As much as the subscriber wants that wants most.
   [[nodiscard]] Share share() GIMNET_EXCLUDES(mutex_);
   /// Messages that did not come for it, by their sequence.
-  [[nodiscard]] std::uint64_t missed(const Reader& reader) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] std::uint64_t missed(const Subscriber& subscriber) GIMNET_EXCLUDES(mutex_);
 
   // ---- where it is
 
@@ -160,10 +160,10 @@ class SubscribedService {
   };
   /// What a message would be. Changes nothing.
   [[nodiscard]] StreamEpochs::Step look(const Position& message) GIMNET_EXCLUDES(mutex_);
-  /// Puts one of its messages into the queues of all readers. The message that came last may come
-  /// once more, with what is retained: it goes to readers of which nothing came yet. `unwanted`:
-  /// nobody takes it; `no_room`: a queue refuses it, and it is in none. Without a position: it has
-  /// no GIMI header. REQUIRES: look() is not `former`.
+  /// Puts one of its messages into the queues of all subscribers. The message that came last may
+  /// come once more, with what is retained: it goes to subscribers of which nothing came yet.
+  /// `unwanted`: nobody takes it; `no_room`: a queue refuses it, and it is in none. Without a
+  /// position: it has no GIMI header. REQUIRES: look() is not `former`.
   enum class Put : std::uint8_t { kept, unwanted, no_room };
   [[nodiscard]] Put put(const std::optional<Position>& position, Message& message)
       GIMNET_EXCLUDES(mutex_);
@@ -202,7 +202,7 @@ class SubscribedService {
 
   Mutex mutex_;
   Condition changed_;
-  std::vector<SharedReader> readers_ GIMNET_GUARDED_BY(mutex_);
+  std::vector<SharedSubscriber> subscribers_ GIMNET_GUARDED_BY(mutex_);
   bool latest_ GIMNET_GUARDED_BY(mutex_) = false;  ///< its delivery
   bool exists_ GIMNET_GUARDED_BY(mutex_) = false;
   bool accepts_ GIMNET_GUARDED_BY(mutex_) = false;

@@ -15,7 +15,7 @@ Result<Admitted, Failure> admit_at(const net::Address& address, const net::DialO
   if (hello.token.empty() && token_for) hello.token = token_for(address.url());
   auto welcomed = net::dial_hub(address, options, hello, deadline, cancel);
   if (!welcomed) return failure_of(welcomed.error());
-  auto session = session_of(welcomed->welcome, hello.resume, hello.resume_epoch);
+  auto session = session_terms_of(welcomed->welcome, hello.resume, hello.resume_epoch);
   if (!session) {
     return Failure{session.error().status, address.url() + ": " + session.error().sentence};
   }

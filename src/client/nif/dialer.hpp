@@ -8,7 +8,7 @@
 
 #include "base/result.hpp"
 #include "client/nif/error.hpp"
-#include "client/nif/session.hpp"
+#include "client/nif/session_terms.hpp"
 #include "net/dial.hpp"
 #include "proto/control/link.hpp"
 
@@ -18,7 +18,7 @@ namespace gimnet::nif {
 struct Admitted {
   std::unique_ptr<net::Stream> stream;
   std::string address;  ///< of the hub, as a URL
-  Session session;
+  SessionTerms session;
 };
 
 /// The token to show at an address; empty: none.

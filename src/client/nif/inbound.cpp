@@ -30,7 +30,7 @@ Inbound::Verdict Inbound::malformed(std::string why) {
   return Verdict::malformed;
 }
 
-void Inbound::begin(const Session& session) {
+void Inbound::begin(const SessionTerms& session) {
   filled_ = parsed_ = charged_ = uncharged_bytes_ = 0;
   if (slab_ != nullptr && !slab_->is_only_reference()) std::exchange(slab_, nullptr)->release();
   id_ = session.id;

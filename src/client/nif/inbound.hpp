@@ -10,7 +10,7 @@
 #include "client/nif/event_record.hpp"
 #include "client/nif/message_assembler.hpp"
 #include "client/nif/reported_messages.hpp"
-#include "client/nif/session.hpp"
+#include "client/nif/session_terms.hpp"
 #include "client/nif/storage.hpp"
 #include "proto/control/control_message.hpp"
 #include "proto/control/link.hpp"
@@ -79,7 +79,7 @@ class Inbound {
   Inbound& operator=(const Inbound&) = delete;
 
   /// A new connection; what its handshake left over is to be given to take() next.
-  void begin(const Session& session);
+  void begin(const SessionTerms& session);
 
   /// Room for the next bytes, at least one frame's worth. Empty: no memory. Valid until: take().
   [[nodiscard]] std::span<std::byte> space();

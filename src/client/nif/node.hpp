@@ -181,7 +181,7 @@ class Node final : private InboundHost {
   Inbound inbound_;
   TokenStore tokens_;
   std::unique_ptr<net::Stream> stream_;  ///< null: not connected
-  Session session_;
+  SessionTerms session_;
   std::string address_;                  ///< of the hub that admitted it last, as a URL
   std::string name_;                     ///< to ask for
   std::vector<net::Address> addresses_;  ///< of hubs; the one that admitted it last comes first

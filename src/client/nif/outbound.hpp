@@ -19,7 +19,7 @@
 #include "client/nif/outgoing.hpp"
 #include "client/nif/reported_messages.hpp"
 #include "client/nif/send_queue.hpp"
-#include "client/nif/session.hpp"
+#include "client/nif/session_terms.hpp"
 #include "gimnet/nif.h"
 #include "net/wait.hpp"
 #include "proto/frame/flow.hpp"
@@ -115,7 +115,8 @@ class Outbound {
   // The library's thread.
   /// The connection stands. Returns the count that SKIP has to announce; nothing: the hub's count
   /// is impossible, and it is not attached.
-  [[nodiscard]] std::optional<std::uint64_t> attach(net::Stream& stream, const Session& session)
+  [[nodiscard]] std::optional<std::uint64_t> attach(net::Stream& stream,
+                                                    const SessionTerms& session)
       GIMNET_EXCLUDES(mutex_);
   /// The connection broke; `again`: another one will come. When this returns nobody uses the stream
   /// any more. After Wants::no_memory nothing is kept for the next one.
@@ -259,7 +260,7 @@ class Outbound {
   void write_rounds(bool by_library) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool write_once() GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool write_gathered() GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] std::optional<std::uint64_t> take_up(const Session& session)
+  [[nodiscard]] std::optional<std::uint64_t> take_up(const SessionTerms& session)
       GIMNET_REQUIRES(mutex_);
   /// The kernel has all that was queued.
   [[nodiscard]] bool all_sent() const GIMNET_REQUIRES(mutex_) {
@@ -298,7 +299,7 @@ class Outbound {
       false;  ///< the program sent something with NIF_FLAG_REPORT
   LastMessages last_ GIMNET_GUARDED_BY(mutex_);
   std::optional<std::uint32_t> hub_retains_
-      GIMNET_GUARDED_BY(mutex_);  ///< Session::retained_bytes_max
+      GIMNET_GUARDED_BY(mutex_);  ///< SessionTerms::retained_bytes_max
   std::uint32_t waiting_ GIMNET_GUARDED_BY(mutex_) = 0;
   bool declaring_ GIMNET_GUARDED_BY(mutex_) = false;
   /// Groups of own services that a program may not know yet, by former ones; 0: refused. Limit: own

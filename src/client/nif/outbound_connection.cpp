@@ -54,7 +54,7 @@ void Outbound::look_after_held() {
 }
 
 /// The queue goes on, or begins anew. As attach().
-std::optional<std::uint64_t> Outbound::take_up(const Session& session) {
+std::optional<std::uint64_t> Outbound::take_up(const SessionTerms& session) {
   std::uint64_t missing = 0;
   if (session.resumed) {
     const auto skipped = queue_.resume_from(session.hub_taken);
@@ -71,7 +71,7 @@ std::optional<std::uint64_t> Outbound::take_up(const Session& session) {
   return missing;
 }
 
-std::optional<std::uint64_t> Outbound::attach(net::Stream& stream, const Session& session) {
+std::optional<std::uint64_t> Outbound::attach(net::Stream& stream, const SessionTerms& session) {
   const Inside inside(*this);
   const std::optional<std::uint64_t> missing = take_up(session);
   if (!missing) return std::nullopt;

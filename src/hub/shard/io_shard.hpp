@@ -6,9 +6,9 @@
 #include "hub/shard/allocation_meter.hpp"
 #include "hub/shard/attacher.hpp"
 #include "hub/shard/closer.hpp"
+#include "hub/shard/connection_reader.hpp"
 #include "hub/shard/flusher.hpp"
 #include "hub/shard/keeper.hpp"
-#include "hub/shard/reader.hpp"
 #include "hub/shard/shard_state.hpp"
 
 namespace gimnet::hub {
@@ -80,7 +80,7 @@ class IoShard {
   ShardState state_;
   Closer closer_;
   Flusher flusher_;
-  Reader reader_;
+  ConnectionReader reader_;
   Attacher attacher_;
   Keeper keeper_;
   MpscQueue<ShardCommand> commands_;

@@ -1,8 +1,8 @@
 #pragma once
 
 #include "hub/shard/closer.hpp"
+#include "hub/shard/connection_reader.hpp"
 #include "hub/shard/flusher.hpp"
-#include "hub/shard/reader.hpp"
 #include "hub/shard/shard_state.hpp"
 
 namespace gimnet::hub {
@@ -12,7 +12,7 @@ namespace gimnet::hub {
 /// safety: one shard.
 class Keeper {
  public:
-  Keeper(ShardState& state, Closer& closer, Flusher& flusher, Reader& reader)
+  Keeper(ShardState& state, Closer& closer, Flusher& flusher, ConnectionReader& reader)
       : state_(state), closer_(closer), flusher_(flusher), reader_(reader) {}
 
   /// Between two looks at all connections.
@@ -46,7 +46,7 @@ class Keeper {
   ShardState& state_;
   Closer& closer_;
   Flusher& flusher_;
-  Reader& reader_;
+  ConnectionReader& reader_;
   std::uint64_t next_tick_at_ms_ = 0;
   std::uint64_t drain_deadline_ms_ = 0;
   bool draining_ = false;

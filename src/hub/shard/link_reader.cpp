@@ -1,5 +1,5 @@
+#include "hub/shard/connection_reader.hpp"
 #include "hub/shard/flow_words.hpp"
-#include "hub/shard/reader.hpp"
 #include "proto/frame/frame_parser.hpp"
 
 // Frames that come over a link and are not routed. A link is always read, and only an impossible
@@ -19,14 +19,14 @@ bool is_counted(proto::Kind kind) {
 
 }  // namespace
 
-bool Reader::process_link(Connection& connection, ReceiveBuffer::Received received) {
+bool ConnectionReader::process_link(Connection& connection, ReceiveBuffer::Received received) {
   state_.router.set_neighbour(hub_of(connection.node));
   const bool open = process_runs(connection, received);
   state_.router.set_neighbour(kOwnHub);
   return open;
 }
 
-bool Reader::process_runs(Connection& connection, ReceiveBuffer::Received received) {
+bool ConnectionReader::process_runs(Connection& connection, ReceiveBuffer::Received received) {
   const auto length_max = static_cast<std::uint32_t>(state_.limits.frame_bytes);
   const std::byte* next = received.begin;
   state_.router.begin_bytes(connection.node);
@@ -45,8 +45,8 @@ bool Reader::process_runs(Connection& connection, ReceiveBuffer::Received receiv
   return true;
 }
 
-bool Reader::handle_from_link(Connection& connection, const proto::RunView& view,
-                              Admission admission) {
+bool ConnectionReader::handle_from_link(Connection& connection, const proto::RunView& view,
+                                        Admission admission) {
   switch (admission) {
     case Admission::link:
       return handle_link(connection, view);
@@ -82,8 +82,8 @@ bool Reader::handle_from_link(Connection& connection, const proto::RunView& view
   return true;
 }
 
-void Reader::drop_from_link(Connection& connection, const proto::RunView& view,
-                            proto::DropReason reason) {
+void ConnectionReader::drop_from_link(Connection& connection, const proto::RunView& view,
+                                      proto::DropReason reason) {
   if (!is_counted(proto::load_header(view.bytes).kind)) return;
   count(connection, view);
   // A sender that may not speak there is not told: the source may be anybody's.
@@ -95,7 +95,7 @@ void Reader::drop_from_link(Connection& connection, const proto::RunView& view,
 }
 
 /// It counts its hop, and never goes back to the hub that it came from.
-void Reader::pass_on_report(Connection& connection, const proto::RunView& view) {
+void ConnectionReader::pass_on_report(Connection& connection, const proto::RunView& view) {
   const proto::FrameHeader header = proto::load_header(view.bytes);
   const HubId to = hub_of(NodeId{header.dst});
   const bool back =
@@ -108,7 +108,7 @@ void Reader::pass_on_report(Connection& connection, const proto::RunView& view) 
 }
 
 /// PAUSE or RESUME on its way to a sender. Only the next hop towards the destination may say it.
-void Reader::pass_on_flow(Connection& connection, const proto::RunView& view) {
+void ConnectionReader::pass_on_flow(Connection& connection, const proto::RunView& view) {
   const auto message =
       proto::flow::decode({view.bytes + proto::kHeaderSize, view.size - proto::kHeaderSize});
   if (!message || view.size > proto::flow::kFrameSizeMax) return state_.counters.malformed.add(1);

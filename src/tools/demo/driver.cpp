@@ -56,20 +56,21 @@ void Driver::change_speed(double speed) {
   changed_ = true;
 }
 
-void Driver::press(Key key, const Monitor& monitor, std::int64_t now_ns) {
+void Driver::press(Keystroke key, const Monitor& monitor, std::int64_t now_ns) {
   if (plays_log(monitor)) {
     const double speed = speed_.value_or(monitor.info()->speed);
-    if (key == Key::kFaster) change_speed(faster_than(speed));
-    if (key == Key::kSlower) change_speed(slower_than(speed));
-    if (key == Key::kStop) {
+    if (key == Keystroke::kFaster) change_speed(faster_than(speed));
+    if (key == Keystroke::kSlower) change_speed(slower_than(speed));
+    if (key == Keystroke::kStop) {
       paused_ = !paused_;
       changed_ = true;
     }
     return;
   }
-  if (key == Key::kAutopilot) autopilot_ = !autopilot_;
-  const bool drives = key == Key::kForward || key == Key::kBack || key == Key::kLeft ||
-                      key == Key::kRight || key == Key::kStop;
+  if (key == Keystroke::kAutopilot) autopilot_ = !autopilot_;
+  const bool drives = key == Keystroke::kForward || key == Keystroke::kBack ||
+                      key == Keystroke::kLeft || key == Keystroke::kRight ||
+                      key == Keystroke::kStop;
   // A key takes the wheel from the course.
   if (drives) autopilot_ = false;
   teleop_.press(key, now_ns);

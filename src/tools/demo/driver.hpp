@@ -40,7 +40,7 @@ class Driver {
   explicit Driver(bool autopilot) : autopilot_(autopilot) {}
 
   /// Takes a key of driving or playing; others are not its business.
-  void press(Key key, const Monitor& monitor, std::int64_t now_ns);
+  void press(Keystroke key, const Monitor& monitor, std::int64_t now_ns);
 
   /// From now on only one thing is said: finish.
   void finish() { finish_ = true; }

@@ -11,20 +11,22 @@ constexpr char kEscape = '\x1b';
 
 struct Meaning {
   std::string_view bytes;  // each of which means it
-  Key key;
+  Keystroke key;
 };
 
 constexpr Meaning kMeanings[] = {
-    {"wW", Key::kForward},     {"sS", Key::kBack},   {"aA", Key::kLeft},
-    {"dD", Key::kRight},       {" ", Key::kStop},    {"]>.", Key::kFaster},
-    {"[<,", Key::kSlower},     {"+=", Key::kZoomIn}, {"-_", Key::kZoomOut},
-    {"0", Key::kFit},          {"fF", Key::kFollow}, {"tT", Key::kTrail},
-    {"pP", Key::kAutopilot},   {"hH?", Key::kHelp},  {"\x0c", Key::kRedraw},
-    {"qQ\x03\x04", Key::kQuit}};
-constexpr Meaning kArrows[] = {
-    {"A", Key::kForward}, {"B", Key::kBack}, {"C", Key::kRight}, {"D", Key::kLeft}};
+    {"wW", Keystroke::kForward},     {"sS", Keystroke::kBack},   {"aA", Keystroke::kLeft},
+    {"dD", Keystroke::kRight},       {" ", Keystroke::kStop},    {"]>.", Keystroke::kFaster},
+    {"[<,", Keystroke::kSlower},     {"+=", Keystroke::kZoomIn}, {"-_", Keystroke::kZoomOut},
+    {"0", Keystroke::kFit},          {"fF", Keystroke::kFollow}, {"tT", Keystroke::kTrail},
+    {"pP", Keystroke::kAutopilot},   {"hH?", Keystroke::kHelp},  {"\x0c", Keystroke::kRedraw},
+    {"qQ\x03\x04", Keystroke::kQuit}};
+constexpr Meaning kArrows[] = {{"A", Keystroke::kForward},
+                               {"B", Keystroke::kBack},
+                               {"C", Keystroke::kRight},
+                               {"D", Keystroke::kLeft}};
 
-std::optional<Key> key_in(std::span<const Meaning> meanings, char byte) {
+std::optional<Keystroke> key_in(std::span<const Meaning> meanings, char byte) {
   for (const Meaning& meaning : meanings) {
     if (meaning.bytes.find(byte) != std::string_view::npos) return meaning.key;
   }
@@ -46,19 +48,19 @@ std::size_t sequence_size(std::string_view text) {
   return text.size();
 }
 
-std::optional<Key> key_of_sequence(std::string_view sequence) {
+std::optional<Keystroke> key_of_sequence(std::string_view sequence) {
   if (sequence.size() < 3 || sequence[2] == '[') return std::nullopt;
   return key_in(kArrows, sequence.back());
 }
 
 }  // namespace
 
-std::vector<Key> keys_in(std::string_view bytes) {
-  std::vector<Key> keys;
+std::vector<Keystroke> keys_in(std::string_view bytes) {
+  std::vector<Keystroke> keys;
   while (!bytes.empty()) {
     const bool escape = bytes.front() == kEscape;
     const std::size_t size = escape ? sequence_size(bytes) : 1;
-    const std::optional<Key> key =
+    const std::optional<Keystroke> key =
         escape ? key_of_sequence(bytes.substr(0, size)) : key_in(kMeanings, bytes.front());
     if (key) keys.push_back(*key);
     bytes.remove_prefix(size);
@@ -66,19 +68,19 @@ std::vector<Key> keys_in(std::string_view bytes) {
   return keys;
 }
 
-void Teleop::press(Key key, std::int64_t now_ns) {
+void Teleop::press(Keystroke key, std::int64_t now_ns) {
   switch (key) {
-    case Key::kForward:
-    case Key::kBack:
-      linear_ = key == Key::kForward ? kLinear_mps : -kLinear_mps / 2.0;
+    case Keystroke::kForward:
+    case Keystroke::kBack:
+      linear_ = key == Keystroke::kForward ? kLinear_mps : -kLinear_mps / 2.0;
       linear_until_ns_ = now_ns + kHoldLinear_ns;
       break;
-    case Key::kLeft:
-    case Key::kRight:
-      angular_ = key == Key::kLeft ? kAngular_radps : -kAngular_radps;
+    case Keystroke::kLeft:
+    case Keystroke::kRight:
+      angular_ = key == Keystroke::kLeft ? kAngular_radps : -kAngular_radps;
       angular_until_ns_ = now_ns + kHoldAngular_ns;
       break;
-    case Key::kStop:
+    case Keystroke::kStop:
       linear_until_ns_ = angular_until_ns_ = now_ns;
       break;
     default:

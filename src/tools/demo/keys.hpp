@@ -9,7 +9,7 @@
 namespace gimnet::demo {
 
 /// The keys that the demo understands.
-enum class Key : std::uint8_t {
+enum class Keystroke : std::uint8_t {
   kForward,
   kBack,
   kLeft,
@@ -31,7 +31,7 @@ enum class Key : std::uint8_t {
 /// The keys in the bytes of a terminal: letters in either case, arrows, Ctrl-C and Ctrl-L.
 /// Sequences that mean nothing here are skipped whole, and so is Esc alone. Thread safety: pure
 /// function.
-[[nodiscard]] std::vector<Key> keys_in(std::string_view bytes);
+[[nodiscard]] std::vector<Keystroke> keys_in(std::string_view bytes);
 
 /// Turns keys into a wanted speed. A terminal tells that a key goes down and repeats, never that it
 /// goes up: a key holds for a while and then lets go, long enough to bridge the pause before the
@@ -45,7 +45,7 @@ class Teleop {
   static constexpr std::int64_t kHoldAngular_ns = 300'000'000;
 
   /// Takes a key; others than W A S D and space are not its business.
-  void press(Key key, std::int64_t now_ns);
+  void press(Keystroke key, std::int64_t now_ns);
 
   /// The wanted speed at that time.
   [[nodiscard]] Twist twist(std::int64_t now_ns) const;

@@ -86,7 +86,7 @@ bool drives_itself(const DemoOptions& options, const Terminal* terminal) {
 // Checks what the robot's process would only find later, where the sentence would be harder to
 // find.
 std::optional<Error> unusable_input(const DemoOptions& options) {
-  if (options.role != Role::kAll) return std::nullopt;
+  if (options.role != DemoRole::kAll) return std::nullopt;
   const Result<Robot::SourceMaker> maker = source_maker(options);
   return maker ? std::nullopt : std::optional(maker.error());
 }
@@ -139,7 +139,7 @@ ExitCode run_viewer(const DemoOptions& options) {
   std::optional<OwnNetwork> network;
   ViewerOptions viewing;
   viewing.hub_url = options.hub_url;
-  viewing.own_robot = options.role == Role::kAll;
+  viewing.own_robot = options.role == DemoRole::kAll;
   if (viewing.own_robot) {
     Result<OwnNetwork> started = OwnNetwork::start(options, folder_of_this_program());
     if (!started) {
@@ -214,8 +214,8 @@ int main(int count, char** words) {
   // The viewer takes its time to let everything arrive, and then ends the others.
   constexpr unsigned kRobotPatience_s = 1;
   constexpr unsigned kViewerPatience_s = 20;
-  remember_stop_signals(options->role == Role::kRobot ? kRobotPatience_s : kViewerPatience_s);
+  remember_stop_signals(options->role == DemoRole::kRobot ? kRobotPatience_s : kViewerPatience_s);
   if (options->labs) return static_cast<int>(run_laboratories(*options));
-  return static_cast<int>(options->role == Role::kRobot ? run_robot(*options)
-                                                        : run_viewer(*options));
+  return static_cast<int>(options->role == DemoRole::kRobot ? run_robot(*options)
+                                                            : run_viewer(*options));
 }

@@ -112,10 +112,10 @@ std::optional<Error> apply(DemoOptions& options, std::string_view name, std::str
   return std::nullopt;
 }
 
-std::optional<Error> misplaced(const Argument& argument, Role role) {
+std::optional<Error> misplaced(const Argument& argument, DemoRole role) {
   constexpr unsigned kRoles[] = {kInAll, kInRobot, kInView};
   if ((argument.roles & kRoles[static_cast<std::size_t>(role)]) != 0) return std::nullopt;
-  if (role == Role::kAll) {
+  if (role == DemoRole::kAll) {
     return Error{
         fmt::format("{} is for one part of the demo: say 'robot' or 'view' first, or leave it out",
                     argument.name)};
@@ -125,7 +125,7 @@ std::optional<Error> misplaced(const Argument& argument, Role role) {
         fmt::format("{} is for the whole demo; leave 'robot' or 'view' out", argument.name)};
   }
   return Error{
-      role == Role::kView
+      role == DemoRole::kView
           ? fmt::format("{} is the robot's; give it to 'gimnet-demo robot'", argument.name)
           : fmt::format("{} is the viewer's; give it to 'gimnet-demo view'", argument.name)};
 }
@@ -158,7 +158,7 @@ Result<DemoOptions> parse_options(std::span<const char* const> arguments) {
   if (!arguments.empty()) {
     const std::string_view first = arguments.front();
     if (first == "robot" || first == "view") {
-      options.role = first == "robot" ? Role::kRobot : Role::kView;
+      options.role = first == "robot" ? DemoRole::kRobot : DemoRole::kView;
       index = 1;
     }
   }

@@ -11,7 +11,7 @@
 namespace gimnet::demo {
 
 /// The part of the demo that this process is.
-enum class Role : std::uint8_t { kAll, kRobot, kView };
+enum class DemoRole : std::uint8_t { kAll, kRobot, kView };
 
 /// The choice of characters.
 enum class Glyphs : std::uint8_t { kAuto, kUtf8, kAscii };
@@ -20,7 +20,7 @@ enum class Glyphs : std::uint8_t { kAuto, kUtf8, kAscii };
 struct DemoOptions {
   static constexpr double kSecondsMax = 86'400.0;
 
-  Role role = Role::kAll;
+  DemoRole role = DemoRole::kAll;
   bool help = false;
   bool labs = false;  ///< two laboratories in place of one robot
   /// A log to play; empty: a simulated robot.

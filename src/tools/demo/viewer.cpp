@@ -38,30 +38,30 @@ void Viewer::take(const NodePort::Event& event) {
   if (first_heard_ns_ == 0 && monitor_.pose()) first_heard_ns_ = event.arrival_ns;
 }
 
-void Viewer::press(Key key, std::int64_t now_ns) {
+void Viewer::press(Keystroke key, std::int64_t now_ns) {
   switch (key) {
-    case Key::kQuit:
+    case Keystroke::kQuit:
       quit_ = true;
       break;
-    case Key::kHelp:
+    case Keystroke::kHelp:
       help_ = !help_;
       break;
-    case Key::kTrail:
+    case Keystroke::kTrail:
       map_.trail = !map_.trail;
       break;
-    case Key::kFollow:
+    case Keystroke::kFollow:
       map_.follow = !map_.follow;
       break;
-    case Key::kZoomIn:
+    case Keystroke::kZoomIn:
       map_.zoom = std::min(map_.zoom * kZoomStep, kZoomMax);
       break;
-    case Key::kZoomOut:
+    case Keystroke::kZoomOut:
       map_.zoom = std::max(map_.zoom / kZoomStep, 1.0);
       break;
-    case Key::kFit:
+    case Keystroke::kFit:
       map_ = MapChoice{};
       break;
-    case Key::kRedraw:
+    case Keystroke::kRedraw:
       writer_.redraw();
       break;
     default:
@@ -75,7 +75,7 @@ void Viewer::take_keys(std::int64_t now_ns) {
   if (terminal_ == nullptr) return;
   std::string bytes;
   if (!terminal_->read(bytes)) quit_ = true;
-  for (const Key key : keys_in(bytes)) press(key, now_ns);
+  for (const Keystroke key : keys_in(bytes)) press(key, now_ns);
 }
 
 ScreenState Viewer::screen_state(std::int64_t now_ns) const {

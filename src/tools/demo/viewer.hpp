@@ -67,7 +67,7 @@ class Viewer {
   [[nodiscard]] bool everything_arrived() const;
   void take(const NodePort::Event& event);
   void take_keys(std::int64_t now_ns);
-  void press(Key key, std::int64_t now_ns);
+  void press(Keystroke key, std::int64_t now_ns);
   void draw(std::int64_t now_ns);
   void report_progress(std::int64_t now_ns);
   [[nodiscard]] ScreenState screen_state(std::int64_t now_ns) const;

@@ -93,7 +93,7 @@ TEST_F(RefusedSubscriptions, AreNoOthersWhereTheHubRefusesThemAgain) {
   answer_subscribe(kWindow, proto::Status::limit);
   asking.join();
   EXPECT_TRUE(first_.service->standing().is(Status::limit));
-  EXPECT_EQ(table_.subscriptions(), 1u) << "the first reader is there still";
+  EXPECT_EQ(table_.subscriptions(), 1u) << "the first subscriber is there still";
   EXPECT_TRUE(moves_.empty());
   std::thread once_more([&] { EXPECT_TRUE(table_.subscribe(kName, kWish)); });
   answer_subscribe(kWindow, proto::Status::done);

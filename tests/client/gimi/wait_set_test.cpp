@@ -14,7 +14,7 @@
 #include "base/clock.hpp"
 #include "client/gimi/answer_queue.hpp"
 #include "client/gimi/inbox.hpp"
-#include "client/gimi/watch_table.hpp"
+#include "client/gimi/watch_queues.hpp"
 #include "tests/client/gimi/support/made_message.hpp"
 
 namespace gimnet::gimi {

@@ -229,7 +229,7 @@ TEST(HostileHub, NoWelcomeThatLiesIsTaken) {
     add_control(bytes, proto::Kind::link, control(proto::Welcome::kOperation, 0, body));
     net::DialHandshake handshake;
     if (handshake.take(bytes) == net::DialHandshake::State::welcome) {
-      EXPECT_FALSE(session_of(handshake.welcome(), true, 0x1234));
+      EXPECT_FALSE(session_terms_of(handshake.welcome(), true, 0x1234));
     } else {
       EXPECT_NE(handshake.error().sentence, "");
     }

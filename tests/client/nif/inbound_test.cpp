@@ -351,7 +351,7 @@ TEST(Inbound, ANewConnectionLosesUnfinishedMessages) {
   std::vector<std::byte> bytes;
   add_frame(bytes, fragment(9, 0, 2u << 20), "begin");
   ASSERT_EQ(receiving.feed(bytes), Inbound::Verdict::going);
-  Session session = receiving.session();
+  SessionTerms session = receiving.session();
   receiving.inbound.begin(session);
   EXPECT_EQ(receiving.host.gaps(), 1u);
   ASSERT_EQ(receiving.host.taken_sent.size(), 1u);
@@ -364,7 +364,7 @@ TEST(Inbound, AResumedConnectionGoesOn) {
   std::vector<std::byte> bytes;
   add_frame(bytes, fragment(9, 0, 6), "abc");
   ASSERT_EQ(receiving.feed(bytes), Inbound::Verdict::going);
-  Session session = receiving.session();
+  SessionTerms session = receiving.session();
   session.resume = session.resumed = true;
   receiving.inbound.begin(session);
   EXPECT_EQ(receiving.inbound.taken(), 1u);
@@ -376,7 +376,7 @@ TEST(Inbound, AResumedConnectionGoesOn) {
 
 TEST(Inbound, ConfirmationIsDueAfterAQuarterOfTheHubsBuffer) {
   Receiving receiving;
-  Session session = receiving.session();
+  SessionTerms session = receiving.session();
   session.resume = true;
   session.hub_resume_bytes = 400;
   receiving.inbound.begin(session);

@@ -43,7 +43,7 @@ class SystemCalls : public ::testing::Test {
     EXPECT_EQ(::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0, ends.data()), 0);
     socket_ = std::make_unique<net::SocketStream>(ends[0], net::SocketStream::Family::unix_socket);
     peer_ = std::make_unique<net::SocketStream>(ends[1], net::SocketStream::Family::unix_socket);
-    Session session;
+    SessionTerms session;
     session.id = kOwnId;
     session.frame_bytes_max = 65'536;
     EXPECT_TRUE(outbound_.attach(*socket_, session));

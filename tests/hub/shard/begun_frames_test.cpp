@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "hub/shard/reader.hpp"
+#include "hub/shard/connection_reader.hpp"
 #include "tests/hub/shard/support/hub_rig.hpp"
 
 namespace gimnet::hub {
@@ -12,7 +12,7 @@ using proto::GoodbyeCode;
 using testing::FakeNode;
 using testing::HubRig;
 
-TEST(Reader, ClosesWhenTooMuchIsKeptForBegunFrames) {
+TEST(ConnectionReader, ClosesWhenTooMuchIsKeptForBegunFrames) {
   Limits limits;
   limits.partial_bytes = 1 << 20;  // a slab each for three, not for four
   HubRig rig(1, limits);
@@ -28,7 +28,7 @@ TEST(Reader, ClosesWhenTooMuchIsKeptForBegunFrames) {
   EXPECT_EQ(nodes[3]->goodbye->code, GoodbyeCode::no_memory);
 }
 
-TEST(Reader, WhoBeganAFrameLongestAgoMakesRoomForABegunFrame) {
+TEST(ConnectionReader, WhoBeganAFrameLongestAgoMakesRoomForABegunFrame) {
   Limits limits;
   limits.partial_bytes = 1 << 20;
   HubRig rig(1, limits);

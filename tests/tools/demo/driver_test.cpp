@@ -53,13 +53,13 @@ TEST(Driver, TheCourseDrivesUntilSomebodyTakesTheWheel) {
   const std::optional<DriveCommand> first = driver.next(monitor, kNow_ns);
   ASSERT_TRUE(first);
   EXPECT_NE(first->twist.angular_radps, 0.0);
-  driver.press(Key::kForward, monitor, kNow_ns);
+  driver.press(Keystroke::kForward, monitor, kNow_ns);
   EXPECT_FALSE(driver.autopilot());
   const std::optional<DriveCommand> second = driver.next(monitor, kNow_ns + Driver::kPeriod_ns);
   ASSERT_TRUE(second);
   EXPECT_EQ(second->twist.linear_mps, Teleop::kLinear_mps);
   EXPECT_EQ(second->stamp.number, first->stamp.number + 1);
-  driver.press(Key::kAutopilot, monitor, kNow_ns);
+  driver.press(Keystroke::kAutopilot, monitor, kNow_ns);
   EXPECT_TRUE(driver.autopilot());
 }
 
@@ -67,15 +67,15 @@ TEST(Driver, TellsALogOnlyWhatChanges) {
   Driver driver(false);
   const Monitor monitor = at_a_log();
   EXPECT_FALSE(driver.next(monitor, kNow_ns));
-  driver.press(Key::kFaster, monitor, kNow_ns);
+  driver.press(Keystroke::kFaster, monitor, kNow_ns);
   EXPECT_EQ(driver.next(monitor, kNow_ns)->speed, 5.0);
   EXPECT_FALSE(driver.next(monitor, kNow_ns + 1'000'000'000));
-  driver.press(Key::kSlower, monitor, kNow_ns);
-  driver.press(Key::kSlower, monitor, kNow_ns);
+  driver.press(Keystroke::kSlower, monitor, kNow_ns);
+  driver.press(Keystroke::kSlower, monitor, kNow_ns);
   EXPECT_EQ(driver.next(monitor, kNow_ns)->speed, 1.0);
-  driver.press(Key::kStop, monitor, kNow_ns);
+  driver.press(Keystroke::kStop, monitor, kNow_ns);
   EXPECT_TRUE(driver.next(monitor, kNow_ns)->paused);
-  driver.press(Key::kStop, monitor, kNow_ns);
+  driver.press(Keystroke::kStop, monitor, kNow_ns);
   EXPECT_FALSE(driver.next(monitor, kNow_ns)->paused);
   EXPECT_EQ(driver.commands(), 4U);
 }
@@ -83,9 +83,9 @@ TEST(Driver, TellsALogOnlyWhatChanges) {
 TEST(Driver, SpeedsHaveEnds) {
   Driver driver(false);
   const Monitor monitor = at_a_log();
-  for (int press = 0; press < 20; ++press) driver.press(Key::kFaster, monitor, kNow_ns);
+  for (int press = 0; press < 20; ++press) driver.press(Keystroke::kFaster, monitor, kNow_ns);
   EXPECT_EQ(driver.next(monitor, kNow_ns)->speed, 100.0);
-  for (int press = 0; press < 20; ++press) driver.press(Key::kSlower, monitor, kNow_ns);
+  for (int press = 0; press < 20; ++press) driver.press(Keystroke::kSlower, monitor, kNow_ns);
   EXPECT_EQ(driver.next(monitor, kNow_ns)->speed, 0.1);
 }
 

@@ -19,7 +19,7 @@ std::string complaint(const std::vector<const char*>& words) {
 
 TEST(DemoOptions, WithoutArgumentsEverythingIsStarted) {
   const DemoOptions options = parsed({}).value();
-  EXPECT_EQ(options.role, Role::kAll);
+  EXPECT_EQ(options.role, DemoRole::kAll);
   EXPECT_FALSE(options.seconds);
   EXPECT_TRUE(options.log.empty());
 }
@@ -33,8 +33,8 @@ TEST(DemoOptions, TakesValuesBehindABlankOrAnEqualsSign) {
 }
 
 TEST(DemoOptions, TheRolesComeFirst) {
-  EXPECT_EQ(parsed({"robot", "--hub", "unix:/x"}).value().role, Role::kRobot);
-  EXPECT_EQ(parsed({"view", "--robot", "r2.d-2"}).value().role, Role::kView);
+  EXPECT_EQ(parsed({"robot", "--hub", "unix:/x"}).value().role, DemoRole::kRobot);
+  EXPECT_EQ(parsed({"view", "--robot", "r2.d-2"}).value().role, DemoRole::kView);
   EXPECT_THAT(complaint({"--seconds", "1", "robot"}), HasSubstr("no argument 'robot'"));
 }
 

@@ -18,17 +18,17 @@ namespace gimnet::nif::test {
 /// The sending half of a node on a socket of its own, and that socket's other end. The test is the
 /// library's thread.
 struct Line {
-  explicit Line(const Session& session = session_of(false)) { attach(session); }
+  explicit Line(const SessionTerms& session = session_of(false)) { attach(session); }
 
-  static Session session_of(bool resume) {
-    Session session;
+  static SessionTerms session_of(bool resume) {
+    SessionTerms session;
     session.id = kOwnId;
     session.frame_bytes_max = 65'536;
     session.resume = resume;
     return session;
   }
 
-  void attach(const Session& session) {
+  void attach(const SessionTerms& session) {
     std::array<int, 2> ends{};
     ASSERT_EQ(::socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0, ends.data()), 0);
     socket = net::make_stream(ends[0], net::SocketStream::Family::unix_socket, {});

@@ -97,8 +97,8 @@ struct Receiving {
     inbound.begin(session());
   }
 
-  [[nodiscard]] static Session session() {
-    Session session;
+  [[nodiscard]] static SessionTerms session() {
+    SessionTerms session;
     session.id = kOwnId;
     return session;
   }

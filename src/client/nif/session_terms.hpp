@@ -12,7 +12,7 @@
 namespace gimnet::nif {
 
 /// The terms of one connection, as WELCOME settled them. A value type.
-struct Session {
+struct SessionTerms {
   std::uint32_t id = 0;
   std::uint32_t hub_id = 0;
   std::string hub_name;
@@ -35,7 +35,8 @@ struct Session {
 /// Checks a hub's WELCOME, which is not trusted. `resume`: the HELLO asked for it;
 /// `former_hub_epoch`: the hub's earlier epoch as HELLO named it, 0: none. Only with both may
 /// WELCOME say `resumed`. Errors: NIF_PROTOCOL.
-[[nodiscard]] Result<Session, Failure> session_of(const proto::Welcome& welcome, bool resume,
-                                                  std::uint64_t former_hub_epoch);
+[[nodiscard]] Result<SessionTerms, Failure> session_terms_of(const proto::Welcome& welcome,
+                                                             bool resume,
+                                                             std::uint64_t former_hub_epoch);
 
 }  // namespace gimnet::nif

@@ -1,4 +1,4 @@
-#include "hub/shard/reader.hpp"
+#include "hub/shard/connection_reader.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -22,7 +22,7 @@ using testing::FrameSpec;
 using testing::HubRig;
 using ::testing::SizeIs;
 
-TEST(Reader, CarriesFramesFromOneNodeToAnother) {
+TEST(ConnectionReader, CarriesFramesFromOneNodeToAnother) {
   HubRig rig;
   FakeNode& a = rig.join(0);
   FakeNode& b = rig.join(0);
@@ -37,7 +37,7 @@ TEST(Reader, CarriesFramesFromOneNodeToAnother) {
   EXPECT_EQ(rig.ledger().queued, 0u);
 }
 
-TEST(Reader, GivesTheSameFramesHoweverTheBytesAreSplit) {
+TEST(ConnectionReader, GivesTheSameFramesHoweverTheBytesAreSplit) {
   for (const std::size_t split : {1u, 2u, 3u, 7u, 15u, 16u, 17u, 100u}) {
     HubRig rig;
     FakeNode& a = rig.join(0);
@@ -53,7 +53,7 @@ TEST(Reader, GivesTheSameFramesHoweverTheBytesAreSplit) {
   }
 }
 
-TEST(Reader, AnswersPingWithPong) {
+TEST(ConnectionReader, AnswersPingWithPong) {
   HubRig rig;
   FakeNode& a = rig.join(0);
   rig.send_flow(a, proto::flow::Ping{.sequence = 9, .sent_ns = 1234});
@@ -65,7 +65,7 @@ TEST(Reader, AnswersPingWithPong) {
   EXPECT_GT(pongs[0].now_ns, 0);
 }
 
-TEST(Reader, TellsTheConductorOfAGoodbye) {
+TEST(ConnectionReader, TellsTheConductorOfAGoodbye) {
   HubRig rig;
   FakeNode& a = rig.join(0);
   rig.write(a, HubRig::frame(a, 0,
@@ -85,7 +85,7 @@ TEST(Reader, TellsTheConductorOfAGoodbye) {
   EXPECT_FALSE(a.goodbye) << "nothing follows a GOODBYE";
 }
 
-TEST(Reader, HandsControlFramesToTheConductor) {
+TEST(ConnectionReader, HandsControlFramesToTheConductor) {
   HubRig rig;
   FakeNode& a = rig.join(0);
   rig.send(a, 0, "request", {.kind = Kind::ns});
@@ -99,7 +99,7 @@ TEST(Reader, HandsControlFramesToTheConductor) {
   EXPECT_EQ(event->frame.size(), proto::kHeaderSize + 7);
 }
 
-TEST(Reader, TakesAsManyUnansweredRequestsAsAllowedAndNotOneMore) {
+TEST(ConnectionReader, TakesAsManyUnansweredRequestsAsAllowedAndNotOneMore) {
   Limits limits;
   limits.requests = 3;
   HubRig rig(1, limits);
@@ -119,7 +119,7 @@ TEST(Reader, TakesAsManyUnansweredRequestsAsAllowedAndNotOneMore) {
   EXPECT_EQ(a.goodbye->code, GoodbyeCode::too_many_requests);
 }
 
-TEST(Reader, CountsRequestsUpToTheLargestLimit) {
+TEST(ConnectionReader, CountsRequestsUpToTheLargestLimit) {
   Limits limits;
   limits.requests = 65'536;
   HubRig rig(1, limits);
@@ -139,7 +139,7 @@ TEST(Reader, CountsRequestsUpToTheLargestLimit) {
 }
 
 // Its sender's clock is an hour ahead: it may be as old as it says, and not an hour older.
-TEST(Reader, TakesAnAgeFromTheFutureForNow) {
+TEST(ConnectionReader, TakesAnAgeFromTheFutureForNow) {
   HubRig rig;
   FakeNode& a = rig.join(0);
   FakeNode& b = rig.join(0);
@@ -167,7 +167,7 @@ TEST(Reader, TakesAnAgeFromTheFutureForNow) {
   EXPECT_EQ(age->longest_ms, 250u);
 }
 
-TEST(Reader, FillsInTraceAndCarriesWhatItDoesNotKnow) {
+TEST(ConnectionReader, FillsInTraceAndCarriesWhatItDoesNotKnow) {
   HubRig rig;
   FakeNode& a = rig.join(0);
   FakeNode& b = rig.join(0);
@@ -208,7 +208,7 @@ std::string fragment(std::uint32_t message, std::uint32_t offset, std::uint32_t 
 }
 
 // A message that goes on in another lane than it began in could not be put together.
-TEST(Reader, MovesARealTimeMessageToLane1WholeOrNotAtAll) {
+TEST(ConnectionReader, MovesARealTimeMessageToLane1WholeOrNotAtAll) {
   Limits limits;
   limits.lane0_bytes_per_s = 20'280;  // 2,028 in 100 ms: one of the messages
   HubRig rig(1, limits);
@@ -232,7 +232,7 @@ TEST(Reader, MovesARealTimeMessageToLane1WholeOrNotAtAll) {
   EXPECT_THAT(lanes, ::testing::ElementsAre(0, 0, 0, 0, 1, 1, 1, 1, 0));
 }
 
-TEST(Reader, ClosesForCreditsOfNoUseBeyondTheLimit) {
+TEST(ConnectionReader, ClosesForCreditsOfNoUseBeyondTheLimit) {
   Limits limits;
   limits.oddities_burst = 3;
   HubRig rig(1, limits);
@@ -250,7 +250,7 @@ TEST(Reader, ClosesForCreditsOfNoUseBeyondTheLimit) {
   EXPECT_EQ(rig.sum(&ShardCounters::oddities), 1u);
 }
 
-TEST(Reader, TakesASkipUpToTheLastCountThatThereIs) {
+TEST(ConnectionReader, TakesASkipUpToTheLastCountThatThereIs) {
   HubRig rig;
   FakeNode& a = rig.join(0, {.resume = true});
   const auto skip = [&](std::uint64_t count) {

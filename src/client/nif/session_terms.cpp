@@ -1,4 +1,4 @@
-#include "client/nif/session.hpp"
+#include "client/nif/session_terms.hpp"
 
 #include <algorithm>
 #include <utility>
@@ -26,8 +26,8 @@ std::int64_t milliseconds(std::uint32_t value, std::uint32_t fallback) {
 
 }  // namespace
 
-Result<Session, Failure> session_of(const proto::Welcome& welcome, bool resume,
-                                    std::uint64_t former_hub_epoch) {
+Result<SessionTerms, Failure> session_terms_of(const proto::Welcome& welcome, bool resume,
+                                               std::uint64_t former_hub_epoch) {
   const std::uint32_t index = index_of(welcome.node);
   const HubId hub = hub_of(welcome.node);
   if (index == kHubIndex || index == kEveryIndex || hub == kOwnHub || hub == kEveryHub ||
@@ -40,7 +40,7 @@ Result<Session, Failure> session_of(const proto::Welcome& welcome, bool resume,
   if (welcome.frame_length_max < kFrameLengthMin) {
     return bad_welcome("allows only frames smaller than 16 KiB");
   }
-  Session session;
+  SessionTerms session;
   session.id = welcome.node.value();
   session.hub_id = welcome.hub.value();
   session.hub_name = welcome.hub_name;

@@ -1,4 +1,4 @@
-#include "client/gimi/watch_table.hpp"
+#include "client/gimi/watch_queues.hpp"
 
 #include <utility>
 
@@ -66,8 +66,8 @@ void WatchQueue::visit(const SourceVisitor& visitor) {
   visitor(source_, !entries_.empty() || end_);
 }
 
-Outcome<WatchTable::Begun> WatchTable::watch(const std::string& pattern,
-                                             const WatchOptions& options, Timeout timeout) {
+Outcome<WatchQueues::Begun> WatchQueues::watch(const std::string& pattern,
+                                               const WatchOptions& options, Timeout timeout) {
   std::uint32_t subjects = NIF_WATCH_BY_HAND;
   if (options.nodes) subjects |= NIF_WATCH_NODES;
   if (options.services) subjects |= NIF_WATCH_SERVICES;
@@ -95,7 +95,7 @@ Outcome<WatchTable::Begun> WatchTable::watch(const std::string& pattern,
   return begun;
 }
 
-void WatchTable::unwatch(std::uint32_t number) {
+void WatchQueues::unwatch(std::uint32_t number) {
   {
     const MutexLock lock(mutex_);
     queues_.erase(number);
@@ -103,7 +103,7 @@ void WatchTable::unwatch(std::uint32_t number) {
   static_cast<void>(nif_unwatch(uplink_.node(), number, kLeaveTimeoutMs));
 }
 
-bool WatchTable::on_watched(const nif_incoming& in) {
+bool WatchQueues::on_watched(const nif_incoming& in) {
   if (in.watched == nullptr) return true;
   std::shared_ptr<WatchQueue> queue;
   {
@@ -116,7 +116,7 @@ bool WatchTable::on_watched(const nif_incoming& in) {
   return true;
 }
 
-void WatchTable::end(const Ending& ending) {
+void WatchQueues::end(const Ending& ending) {
   const MutexLock lock(mutex_);
   end_ = ending;
   for (const auto& [number, queue] : queues_) queue->end(ending);

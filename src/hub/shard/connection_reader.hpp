@@ -7,9 +7,9 @@ namespace gimnet::hub {
 
 /// Reads connections: bytes to frames, through the gate, to the router, or to who else they are
 /// for. Thread safety: one shard.
-class Reader {
+class ConnectionReader {
  public:
-  Reader(ShardState& state, Closer& closer) : state_(state), closer_(closer) {}
+  ConnectionReader(ShardState& state, Closer& closer) : state_(state), closer_(closer) {}
 
   /// Reads what is there, up to one turn's share, and routes it, up to another. The connection may
   /// be closed by it. Does nothing while it has a rest.

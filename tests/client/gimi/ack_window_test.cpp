@@ -1,4 +1,4 @@
-#include "client/gimi/send_window.hpp"
+#include "client/gimi/ack_window.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,12 +8,12 @@ namespace {
 constexpr std::int64_t kMs = 1'000'000;
 constexpr std::uint64_t kAll = ~std::uint64_t{0};
 
-void fill(SendWindow& window, std::size_t messages) {
+void fill(AckWindow& window, std::size_t messages) {
   for (std::size_t i = 0; i < messages; ++i) window.open(1, 0);
 }
 
-TEST(SendWindow, TakesAsManyAsItWasTold) {
-  SendWindow window(3);
+TEST(AckWindow, TakesAsManyAsItWasTold) {
+  AckWindow window(3);
   fill(window, 3);
   EXPECT_FALSE(window.has_room(1));
   EXPECT_EQ(window.acknowledge(1, 0, 0, kMs).acknowledged, 1u);
@@ -22,8 +22,8 @@ TEST(SendWindow, TakesAsManyAsItWasTold) {
   EXPECT_FALSE(window.has_room(1));
 }
 
-TEST(SendWindow, TakesAsManyBytesAsFitAndNotOneMore) {
-  SendWindow window(64);
+TEST(AckWindow, TakesAsManyBytesAsFitAndNotOneMore) {
+  AckWindow window(64);
   window.open(kWindowBytesMax - 10, 0);
   EXPECT_TRUE(window.has_room(10));
   EXPECT_FALSE(window.has_room(11));
@@ -35,8 +35,8 @@ TEST(SendWindow, TakesAsManyBytesAsFitAndNotOneMore) {
   EXPECT_FALSE(window.has_room(kWindowBytesMax - 9));
 }
 
-TEST(SendWindow, TakesOneOfAnySize) {
-  SendWindow window(64);
+TEST(AckWindow, TakesOneOfAnySize) {
+  AckWindow window(64);
   EXPECT_TRUE(window.has_room(std::size_t{1} << 30));
   window.open(std::size_t{1} << 30, 0);
   EXPECT_FALSE(window.has_room(0));
@@ -44,8 +44,8 @@ TEST(SendWindow, TakesOneOfAnySize) {
   EXPECT_TRUE(window.has_room(std::size_t{1} << 30));
 }
 
-TEST(SendWindow, BytesAreFreedHoweverAMessageEnds) {
-  SendWindow window(64);
+TEST(AckWindow, BytesAreFreedHoweverAMessageEnds) {
+  AckWindow window(64);
   const auto open = [&] {
     EXPECT_TRUE(window.has_room(kWindowBytesMax)) << "nothing waits";
     return window.open(kWindowBytesMax, 0);
@@ -62,23 +62,23 @@ TEST(SendWindow, BytesAreFreedHoweverAMessageEnds) {
   EXPECT_FALSE(window.has_room(kWindowBytesMax));
 }
 
-TEST(SendWindow, CountsNothingWhenUnsynchronized) {
-  SendWindow window(0);
+TEST(AckWindow, CountsNothingWhenUnsynchronized) {
+  AckWindow window(0);
   for (std::uint32_t sequence = 1; sequence <= 1000; ++sequence)
     EXPECT_EQ(window.open(1, 0), sequence);
   EXPECT_TRUE(window.has_room(1));
   EXPECT_TRUE(window.empty());
 }
 
-TEST(SendWindow, OneAckSpeaksOfMany) {
-  SendWindow window(64);
+TEST(AckWindow, OneAckSpeaksOfMany) {
+  AckWindow window(64);
   fill(window, 64);
   EXPECT_EQ(window.acknowledge(64, kAll, 0, kMs).acknowledged, 64u);
   EXPECT_TRUE(window.empty());
 }
 
-TEST(SendWindow, WaitsForTheOneThatIsMissing) {
-  SendWindow window(3);
+TEST(AckWindow, WaitsForTheOneThatIsMissing) {
+  AckWindow window(3);
   fill(window, 3);
   EXPECT_EQ(window.acknowledge(3, 0b10, 0, kMs).acknowledged, 2u);  // 3 and 1
   EXPECT_EQ(window.size(), 2u);
@@ -87,8 +87,8 @@ TEST(SendWindow, WaitsForTheOneThatIsMissing) {
   EXPECT_TRUE(window.empty());
 }
 
-TEST(SendWindow, StaysWithinReachOfTheBitmap) {
-  SendWindow window(kWindowMax);
+TEST(AckWindow, StaysWithinReachOfTheBitmap) {
+  AckWindow window(kWindowMax);
   fill(window, 64);
   EXPECT_EQ(window.acknowledge(64, kAll >> 2, 0, kMs).acknowledged, 63u);  // all but 1
   EXPECT_TRUE(window.has_room(1));
@@ -96,16 +96,16 @@ TEST(SendWindow, StaysWithinReachOfTheBitmap) {
   EXPECT_FALSE(window.has_room(1)) << "66 could not be acknowledged together with 1";
 }
 
-TEST(SendWindow, IgnoresAcksOfWhatWasNeverSent) {
-  SendWindow window(2);
+TEST(AckWindow, IgnoresAcksOfWhatWasNeverSent) {
+  AckWindow window(2);
   fill(window, 2);
   EXPECT_FALSE(window.acknowledge(4000, kAll, 0, kMs).any());
   EXPECT_FALSE(window.acknowledge(0, 0, 0, kMs).any());
   EXPECT_EQ(window.size(), 2u);
 }
 
-TEST(SendWindow, AsksWhenAnAckIsLate) {
-  SendWindow window(2);
+TEST(AckWindow, AsksWhenAnAckIsLate) {
+  AckWindow window(2);
   window.open(1, 0);
   EXPECT_FALSE(window.ping_due(200 * kMs - 1));
   EXPECT_TRUE(window.ping_due(200 * kMs));
@@ -118,8 +118,8 @@ TEST(SendWindow, AsksWhenAnAckIsLate) {
   EXPECT_TRUE(window.ping_due(800 * kMs));
 }
 
-TEST(SendWindow, AsksAgainAtOnceWhereThePingCouldNotBeSent) {
-  SendWindow window(2);
+TEST(AckWindow, AsksAgainAtOnceWhereThePingCouldNotBeSent) {
+  AckWindow window(2);
   window.open(1, 0);
   window.ping_sent(9, 200 * kMs);
   window.ping_not_sent();
@@ -132,8 +132,8 @@ TEST(SendWindow, AsksAgainAtOnceWhereThePingCouldNotBeSent) {
   EXPECT_FALSE(window.ping_due(3600'000 * kMs)) << "nothing waits any more";
 }
 
-TEST(SendWindow, WaitsLongerWhereTheWayIsLong) {
-  SendWindow window(2);
+TEST(AckWindow, WaitsLongerWhereTheWayIsLong) {
+  AckWindow window(2);
   window.open(1, 0);
   static_cast<void>(window.acknowledge(1, 0, 0, 100 * kMs));
   EXPECT_EQ(window.round_trip_ns(), 100 * kMs);
@@ -142,8 +142,8 @@ TEST(SendWindow, WaitsLongerWhereTheWayIsLong) {
   EXPECT_TRUE(window.ping_due(1400 * kMs));
 }
 
-TEST(SendWindow, APongFreesOnlyWhatStoodBeforeThePing) {
-  SendWindow window(4);
+TEST(AckWindow, APongFreesOnlyWhatStoodBeforeThePing) {
+  AckWindow window(4);
   fill(window, 2);
   window.ping_sent(9, 200 * kMs);
   fill(window, 2);
@@ -154,16 +154,16 @@ TEST(SendWindow, APongFreesOnlyWhatStoodBeforeThePing) {
   EXPECT_EQ(window.ping_number(), 0u);
 }
 
-TEST(SendWindow, APongOfAnotherPingFreesNothing) {
-  SendWindow window(4);
+TEST(AckWindow, APongOfAnotherPingFreesNothing) {
+  AckWindow window(4);
   fill(window, 2);
   window.ping_sent(9, 200 * kMs);
   EXPECT_EQ(window.acknowledge(0, 0, 8, 300 * kMs).lost, 0u);
   EXPECT_EQ(window.size(), 2u);
 }
 
-TEST(SendWindow, TimeAloneNeverFrees) {
-  SendWindow window(1);
+TEST(AckWindow, TimeAloneNeverFrees) {
+  AckWindow window(1);
   window.open(1, 0);
   for (std::int64_t now = 0; now < 3600'000 * kMs; now += 1000 * kMs) {
     if (window.ping_due(now)) window.ping_sent(9, now);
@@ -171,8 +171,8 @@ TEST(SendWindow, TimeAloneNeverFrees) {
   EXPECT_FALSE(window.has_room(1));
 }
 
-TEST(SendWindow, FreesWhatIsKnownToBeLost) {
-  SendWindow window(3);
+TEST(AckWindow, FreesWhatIsKnownToBeLost) {
+  AckWindow window(3);
   fill(window, 3);
   EXPECT_EQ(window.lose(2).lost, 1u);
   EXPECT_EQ(window.lose(2).lost, 0u);
@@ -182,8 +182,8 @@ TEST(SendWindow, FreesWhatIsKnownToBeLost) {
   EXPECT_FALSE(window.ping_due(3600'000 * kMs));
 }
 
-TEST(SendWindow, HurriesWhenSomethingIsDoubtful) {
-  SendWindow window(3);
+TEST(AckWindow, HurriesWhenSomethingIsDoubtful) {
+  AckWindow window(3);
   window.open(1, 0);
   window.hurry();
   EXPECT_TRUE(window.ping_due(1));
@@ -191,8 +191,8 @@ TEST(SendWindow, HurriesWhenSomethingIsDoubtful) {
   EXPECT_FALSE(window.ping_due(2));
 }
 
-TEST(SendWindow, TakesBackWhatWasNotSent) {
-  SendWindow window(1);
+TEST(AckWindow, TakesBackWhatWasNotSent) {
+  AckWindow window(1);
   const std::uint32_t sequence = window.open(1, 0);
   EXPECT_TRUE(window.cancel(sequence));
   EXPECT_TRUE(window.has_room(1));

@@ -1,4 +1,4 @@
-#include "client/nif/session.hpp"
+#include "client/nif/session_terms.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,12 +9,12 @@
 namespace gimnet::nif::test {
 namespace {
 
-TEST(Session, RefusesImpossibleWelcomes) {
-  EXPECT_TRUE(session_of(make_welcome(), true, 0));
+TEST(SessionTerms, RefusesImpossibleWelcomes) {
+  EXPECT_TRUE(session_terms_of(make_welcome(), true, 0));
   const auto fault_with = [](auto change) {
     proto::Welcome welcome = make_welcome();
     change(welcome);
-    const auto session = session_of(welcome, true, 0);
+    const auto session = session_terms_of(welcome, true, 0);
     if (session) return std::string();
     EXPECT_EQ(session.error().status, NIF_PROTOCOL);
     return session.error().sentence;
@@ -28,12 +28,12 @@ TEST(Session, RefusesImpossibleWelcomes) {
   EXPECT_EQ(fault_with([](auto& w) { w.frame_length_max = 16 * 1024; }), "");
 }
 
-TEST(Session, BoundsThatTheHubAsksFor) {
+TEST(SessionTerms, BoundsThatTheHubAsksFor) {
   proto::Welcome welcome = make_welcome();
   welcome.frame_length_max = 1u << 20;
   welcome.keep_alive_ms = 0;
   welcome.silent_ms = 0xFFFFFFFF;
-  const auto session = session_of(welcome, false, 0);
+  const auto session = session_terms_of(welcome, false, 0);
   ASSERT_TRUE(session);
   EXPECT_EQ(session->id, kOwnId);
   EXPECT_EQ(session->name, "robot");
@@ -42,20 +42,20 @@ TEST(Session, BoundsThatTheHubAsksFor) {
   EXPECT_LE(session->silent_after_ns, 120'000 * kNsPerMs);
 }
 
-TEST(Session, ResumesOnlyAsHelloAskedForIt) {
+TEST(SessionTerms, ResumesOnlyAsHelloAskedForIt) {
   proto::Welcome welcome = make_welcome(1000);
   welcome.resumed = true;
   welcome.taken = 5;
-  const auto resumed = session_of(welcome, true, welcome.epoch);
+  const auto resumed = session_terms_of(welcome, true, welcome.epoch);
   ASSERT_TRUE(resumed);
   EXPECT_TRUE(resumed->resumed);
   EXPECT_EQ(resumed->hub_taken, 5u);
-  const auto fresh = session_of(welcome, true, 0);
+  const auto fresh = session_terms_of(welcome, true, 0);
   ASSERT_TRUE(fresh);
   EXPECT_TRUE(fresh->resume);
   EXPECT_FALSE(fresh->resumed);
-  EXPECT_FALSE(session_of(welcome, true, welcome.epoch + 1));
-  EXPECT_FALSE(session_of(welcome, false, welcome.epoch)->resume);
+  EXPECT_FALSE(session_terms_of(welcome, true, welcome.epoch + 1));
+  EXPECT_FALSE(session_terms_of(welcome, false, welcome.epoch)->resume);
 }
 
 }  // namespace

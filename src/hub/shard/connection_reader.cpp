@@ -1,4 +1,4 @@
-#include "hub/shard/reader.hpp"
+#include "hub/shard/connection_reader.hpp"
 
 #include <algorithm>
 #include <cstring>
@@ -26,15 +26,15 @@ Word word_of(const Mail& mail) {
 
 }  // namespace
 
-std::uint64_t Reader::share() const {
+std::uint64_t ConnectionReader::share() const {
   const std::size_t rests = state_.receive_buffer.rests();
   const std::uint64_t all = state_.limits.turn_deliveries;
   return rests == 0 ? all : std::max<std::uint64_t>(1, all / (1 + rests));
 }
 
 /// In read(), which is once a turn for each connection.
-[[gnu::always_inline]] inline void Reader::route_all(Connection& connection,
-                                                     ReceiveBuffer::Received received) {
+[[gnu::always_inline]] inline void ConnectionReader::route_all(Connection& connection,
+                                                               ReceiveBuffer::Received received) {
   const std::uint64_t accepted_before = state_.tally.accepted;
   deliveries_end_ = state_.router.deliveries() + share();
   const bool open = process(connection, received);
@@ -46,7 +46,7 @@ std::uint64_t Reader::share() const {
   if ((posted & state_.fanout.crowded()) != 0) return wait_for_room(connection);
 }
 
-void Reader::read_some(Connection& connection) {
+void ConnectionReader::read_some(Connection& connection) {
   state_.egress.owner.check_here();
   if (connection.gate.has(ReadGate::rest)) return;
   std::uint64_t most =
@@ -67,7 +67,7 @@ void Reader::read_some(Connection& connection) {
   route_all(connection, state_.receive_buffer.commit(connection.tail, result.bytes));
 }
 
-void Reader::go_on(Connection& connection) {
+void ConnectionReader::go_on(Connection& connection) {
   if ((connection.posted_shards & state_.fanout.crowded()) != 0) {
     state_.go_on_later(connection);
     return wait_for_room(connection);
@@ -79,14 +79,14 @@ void Reader::go_on(Connection& connection) {
   look_at_stream(connection);
 }
 
-void Reader::wait_for_room(Connection& connection) {
+void ConnectionReader::wait_for_room(Connection& connection) {
   if (connection.gate.has(ReadGate::no_room)) return;
   connection.gate.shut(ReadGate::no_room);
   state_.waiting_for_room.push_back(&connection);
   state_.signals.arm(connection);
 }
 
-bool Reader::process(Connection& connection, ReceiveBuffer::Received received) {
+bool ConnectionReader::process(Connection& connection, ReceiveBuffer::Received received) {
   if (connection.link != nullptr) [[unlikely]]
     return process_link(connection, received);
   const auto length_max = static_cast<std::uint32_t>(state_.limits.frame_bytes);
@@ -116,8 +116,10 @@ bool Reader::process(Connection& connection, ReceiveBuffer::Received received) {
 }
 
 /// Bytes behind the last whole frame.
-[[gnu::noinline]] bool Reader::take_begun(Connection& connection, std::span<const std::byte> begun,
-                                          bool nothing_before, const proto::NextRun& found) {
+[[gnu::noinline]] bool ConnectionReader::take_begun(Connection& connection,
+                                                    std::span<const std::byte> begun,
+                                                    bool nothing_before,
+                                                    const proto::NextRun& found) {
   if (found.found == proto::Found::too_long) {
     connection.ingress.error = proto::FrameError::too_long;
     return refuse(connection, proto::DropReason::malformed, proto::GoodbyeCode::malformed,
@@ -131,14 +133,15 @@ bool Reader::process(Connection& connection, ReceiveBuffer::Received received) {
   return false;
 }
 
-void Reader::keep_rest(Connection& connection, std::span<const std::byte> rest) {
+void ConnectionReader::keep_rest(Connection& connection, std::span<const std::byte> rest) {
   state_.receive_buffer.keep_rest(connection.tail, rest.data(), rest.data() + rest.size());
   connection.gate.shut(ReadGate::rest);
   state_.go_on_later(connection);
 }
 
 /// Closed itself, a newcomer would pay for those who begin frames and never end them.
-bool Reader::keep(Connection& connection, std::span<const std::byte> begun, std::uint32_t needed) {
+bool ConnectionReader::keep(Connection& connection, std::span<const std::byte> begun,
+                            std::uint32_t needed) {
   const std::byte* const end = begun.data() + begun.size();
   while (!state_.receive_buffer.keep(connection.tail, begun.data(), end, needed)) {
     Connection* const oldest = begun_before(connection);
@@ -151,7 +154,7 @@ bool Reader::keep(Connection& connection, std::span<const std::byte> begun, std:
   return true;
 }
 
-Connection* Reader::begun_before(const Connection& connection) const {
+Connection* ConnectionReader::begun_before(const Connection& connection) const {
   Connection* oldest = nullptr;
   std::uint64_t since_ms = connection.tail_since_ms;
   for (const std::unique_ptr<Connection>& each : state_.connections) {
@@ -164,7 +167,7 @@ Connection* Reader::begun_before(const Connection& connection) const {
   return oldest;
 }
 
-bool Reader::handle_run(Connection& connection, proto::NextRun& found) {
+bool ConnectionReader::handle_run(Connection& connection, proto::NextRun& found) {
   proto::RunView& view = found.run;
   auto* bytes = const_cast<std::byte*>(view.bytes);  // ours until it is handed on
   const Admission admission = state_.gate.admit(connection.ingress, bytes, view, state_.now_ms);
@@ -181,7 +184,8 @@ bool Reader::handle_run(Connection& connection, proto::NextRun& found) {
   return handle_other(connection, view, admission);
 }
 
-bool Reader::handle_other(Connection& connection, const proto::RunView& view, Admission admission) {
+bool ConnectionReader::handle_other(Connection& connection, const proto::RunView& view,
+                                    Admission admission) {
   if (connection.is_link()) return handle_from_link(connection, view, admission);
   switch (admission) {
     case Admission::flow:
@@ -206,8 +210,8 @@ bool Reader::handle_other(Connection& connection, const proto::RunView& view, Ad
       std::string("malformed frame: ") + proto::frame_error_text(connection.ingress.error));
 }
 
-bool Reader::refuse(Connection& connection, proto::DropReason reason, proto::GoodbyeCode code,
-                    const std::string& sentence) {
+bool ConnectionReader::refuse(Connection& connection, proto::DropReason reason,
+                              proto::GoodbyeCode code, const std::string& sentence) {
   // One frame came and ended here; what stands behind it is not looked at and so was never a frame.
   state_.tally.accepted += 1;
   state_.tally.drop(reason, 1);
@@ -215,19 +219,19 @@ bool Reader::refuse(Connection& connection, proto::DropReason reason, proto::Goo
   return false;
 }
 
-void Reader::route(Connection& connection, const proto::NextRun& found) {
+void ConnectionReader::route(Connection& connection, const proto::NextRun& found) {
   const proto::RunView& view = found.run;
   count(connection, view);
   if (proto::load_header(view.bytes).has(proto::kFlagExt)) stamp_arrival(connection, view);
   state_.router.route(state_.receive_buffer.buffer(), view);
 }
 
-void Reader::count(Connection& connection, const proto::RunView& view) {
+void ConnectionReader::count(Connection& connection, const proto::RunView& view) {
   state_.tally.accepted += view.frames;
   if (connection.resume) count_taken(connection, view);
 }
 
-void Reader::count_taken(Connection& connection, const proto::RunView& view) {
+void ConnectionReader::count_taken(Connection& connection, const proto::RunView& view) {
   ResumeState& resume = *connection.resume;
   resume.taken += view.frames;
   resume.bytes_since_told += view.size;
@@ -236,7 +240,7 @@ void Reader::count_taken(Connection& connection, const proto::RunView& view) {
 
 /// TRACE gets the time of arrival. The origin of an AGE is in the time of the hub that the frame
 /// comes from; it is moved to this hub's.
-void Reader::stamp_arrival(const Connection& connection, const proto::RunView& view) {
+void ConnectionReader::stamp_arrival(const Connection& connection, const proto::RunView& view) {
   const LinkPeer* link = connection.link.get();
   const proto::Origin origin = link != nullptr ? proto::Origin::hub : proto::Origin::node;
   const auto frame = proto::parse_frame({view.bytes, view.size}, origin);
@@ -251,7 +255,7 @@ void Reader::stamp_arrival(const Connection& connection, const proto::RunView& v
   static_cast<void>(proto::fill_trace(extensions, {state_.shared.hub, now_ns, now_ns}));
 }
 
-bool Reader::handle_flow(Connection& connection, const proto::RunView& view) {
+bool ConnectionReader::handle_flow(Connection& connection, const proto::RunView& view) {
   const auto message =
       proto::flow::decode({view.bytes + proto::kHeaderSize, view.size - proto::kHeaderSize});
   if (!message && connection.is_link()) {
@@ -273,7 +277,7 @@ bool Reader::handle_flow(Connection& connection, const proto::RunView& view) {
   return true;
 }
 
-bool Reader::take_bad_credit(Connection& connection) {
+bool ConnectionReader::take_bad_credit(Connection& connection) {
   state_.counters.bad_credits.add(1);
   const Limits& limits = state_.limits;
   const std::chrono::milliseconds now{state_.now_ms};
@@ -285,12 +289,12 @@ bool Reader::take_bad_credit(Connection& connection) {
   return false;
 }
 
-void Reader::on_ping(Connection& connection, const proto::flow::Ping& ping) {
+void ConnectionReader::on_ping(Connection& connection, const proto::flow::Ping& ping) {
   send_flow(state_, connection, proto::flow::Pong{ping.sequence, ping.sent_ns, wall_now_ns()});
   if (connection.resume) send_confirm(state_, connection);
 }
 
-void Reader::on_confirm(Connection& connection, const proto::flow::Confirm& confirm) {
+void ConnectionReader::on_confirm(Connection& connection, const proto::flow::Confirm& confirm) {
   if (!connection.resume) return;
   const std::uint64_t confirmed = connection.resume->kept.confirm(confirm.count);
   state_.tally.delivered += confirmed;
@@ -300,7 +304,7 @@ void Reader::on_confirm(Connection& connection, const proto::flow::Confirm& conf
   state_.recipients.mark_dirty(connection);
 }
 
-bool Reader::on_skip(Connection& connection, const proto::flow::Skip& skip) {
+bool ConnectionReader::on_skip(Connection& connection, const proto::flow::Skip& skip) {
   if (!connection.resume || skip.count == proto::flow::kSkipUnknown) return true;
   // The frames before it may not have been taken, so they must not be confirmed with it.
   if (connection.gate.has(ReadGate::draining)) return true;
@@ -314,7 +318,7 @@ bool Reader::on_skip(Connection& connection, const proto::flow::Skip& skip) {
   return true;
 }
 
-bool Reader::handle_link(Connection& connection, const proto::RunView& view) {
+bool ConnectionReader::handle_link(Connection& connection, const proto::RunView& view) {
   const std::span<const std::byte> payload(view.bytes + proto::kHeaderSize,
                                            view.size - proto::kHeaderSize);
   const auto goodbye = proto::decode<proto::Goodbye>(payload);
@@ -329,7 +333,7 @@ bool Reader::handle_link(Connection& connection, const proto::RunView& view) {
   return false;
 }
 
-bool Reader::handle_control(Connection& connection, const proto::RunView& view) {
+bool ConnectionReader::handle_control(Connection& connection, const proto::RunView& view) {
   if (++connection.requests > state_.limits.requests) {
     closer_.close(connection, proto::GoodbyeCode::too_many_requests,
                   "more than " + std::to_string(state_.limits.requests) +
@@ -342,16 +346,16 @@ bool Reader::handle_control(Connection& connection, const proto::RunView& view) 
   return true;
 }
 
-void Reader::begin_mail() {
+void ConnectionReader::begin_mail() {
   deliveries_end_ = state_.router.deliveries() + state_.limits.turn_deliveries;
 }
 
-bool Reader::take_rest_of_mail() {
+bool ConnectionReader::take_rest_of_mail() {
   if (has_rest_of_mail()) take_frames(std::exchange(mail_rest_, Run{}));
   return !has_rest_of_mail();
 }
 
-bool Reader::take_mail(const Mail& mail) {
+bool ConnectionReader::take_mail(const Mail& mail) {
   if (mail.kind != MailKind::frames) {
     take_word(mail);
     return true;
@@ -360,12 +364,12 @@ bool Reader::take_mail(const Mail& mail) {
   return !has_rest_of_mail();
 }
 
-void Reader::take_frames(const Run& frames) {
+void ConnectionReader::take_frames(const Run& frames) {
   const auto length_max = static_cast<std::uint32_t>(state_.limits.frame_bytes);
   mail_rest_ = state_.router.route_handed_over(frames, length_max, deliveries_end_);
 }
 
-void Reader::take_word(const Mail& mail) {
+void ConnectionReader::take_word(const Mail& mail) {
   switch (mail.kind) {
     case MailKind::frames:
       return;

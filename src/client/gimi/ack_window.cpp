@@ -1,4 +1,4 @@
-#include "client/gimi/send_window.hpp"
+#include "client/gimi/ack_window.hpp"
 
 #include <algorithm>
 
@@ -25,7 +25,7 @@ bool is_acknowledged(std::uint32_t sequence, std::uint32_t highest, std::uint64_
 
 }  // namespace
 
-bool SendWindow::has_room(std::size_t bytes) const {
+bool AckWindow::has_room(std::size_t bytes) const {
   if (!synchronized()) return true;
   // What the receiver's library holds for a program that stands still must not have to wait in a
   // hub.
@@ -35,13 +35,13 @@ bool SendWindow::has_room(std::size_t bytes) const {
          (waiting_.empty() || next_sequence_ - waiting_.front().sequence <= kWindowMax);
 }
 
-void SendWindow::free(Waiting& waiting) {
+void AckWindow::free(Waiting& waiting) {
   waiting.acknowledged = true;
   --unacknowledged_;
   unacknowledged_bytes_ -= waiting.bytes;
 }
 
-std::uint32_t SendWindow::open(std::size_t bytes, std::int64_t now_ns) {
+std::uint32_t AckWindow::open(std::size_t bytes, std::int64_t now_ns) {
   GIMNET_ASSERT(has_room(bytes));
   const std::uint32_t sequence = next_sequence_++;
   if (!synchronized()) return sequence;
@@ -51,7 +51,7 @@ std::uint32_t SendWindow::open(std::size_t bytes, std::int64_t now_ns) {
   return sequence;
 }
 
-bool SendWindow::cancel(std::uint32_t sequence) {
+bool AckWindow::cancel(std::uint32_t sequence) {
   GIMNET_ASSERT(sequence + 1 == next_sequence_);
   next_sequence_ = sequence;
   if (waiting_.empty() || waiting_.back().sequence != sequence) return false;
@@ -60,8 +60,8 @@ bool SendWindow::cancel(std::uint32_t sequence) {
   return true;
 }
 
-SendWindow::Freed SendWindow::acknowledge(std::uint32_t highest, std::uint64_t bitmap,
-                                          std::uint32_t pong, std::int64_t now_ns) {
+AckWindow::Freed AckWindow::acknowledge(std::uint32_t highest, std::uint64_t bitmap,
+                                        std::uint32_t pong, std::int64_t now_ns) {
   Freed freed;
   const bool answers_ping = pong != 0 && pong == ping_number_;
   for (Waiting& waiting : waiting_) {
@@ -80,7 +80,7 @@ SendWindow::Freed SendWindow::acknowledge(std::uint32_t highest, std::uint64_t b
   return freed;
 }
 
-SendWindow::Freed SendWindow::lose(std::uint32_t sequence) {
+AckWindow::Freed AckWindow::lose(std::uint32_t sequence) {
   for (Waiting& waiting : waiting_) {
     if (waiting.sequence != sequence || waiting.acknowledged) continue;
     free(waiting);
@@ -90,7 +90,7 @@ SendWindow::Freed SendWindow::lose(std::uint32_t sequence) {
   return {};
 }
 
-SendWindow::Freed SendWindow::lose_all() {
+AckWindow::Freed AckWindow::lose_all() {
   const Freed freed{0, unacknowledged_};
   waiting_.clear();
   unacknowledged_ = 0;
@@ -99,13 +99,13 @@ SendWindow::Freed SendWindow::lose_all() {
   return freed;
 }
 
-bool SendWindow::ping_due(std::int64_t now_ns) const {
+bool AckWindow::ping_due(std::int64_t now_ns) const {
   if (unacknowledged_ == 0) return false;
   if (ping_number_ != 0) return now_ns >= ping_again_ns_;
   return hurried_ || now_ns >= waiting_.front().sent_ns + patience_ns();
 }
 
-void SendWindow::ping_sent(std::uint32_t number, std::int64_t now_ns) {
+void AckWindow::ping_sent(std::uint32_t number, std::int64_t now_ns) {
   hurried_ = false;
   if (number != ping_number_) {
     ping_number_ = number;
@@ -116,17 +116,17 @@ void SendWindow::ping_sent(std::uint32_t number, std::int64_t now_ns) {
   ++pings_;
 }
 
-void SendWindow::ping_not_sent() {
+void AckWindow::ping_not_sent() {
   if (ping_number_ == 0) return;  // an ACK freed everything meanwhile
   ping_again_ns_ = 0;
   --pings_;
 }
 
-std::int64_t SendWindow::patience_ns() const {
+std::int64_t AckWindow::patience_ns() const {
   return std::max(kPatienceRoundTrips * round_trip_ns_, kPatienceMinNs);
 }
 
-void SendWindow::drop_front() {
+void AckWindow::drop_front() {
   while (!waiting_.empty() && waiting_.front().acknowledged) waiting_.pop_front();
   if (waiting_.empty()) {
     ping_number_ = 0;

@@ -3,7 +3,7 @@
 
 #include <cstring>
 
-#include "hub/shard/reader.hpp"
+#include "hub/shard/connection_reader.hpp"
 #include "tests/hub/shard/support/hub_rig.hpp"
 
 // Frames that close their connection, and what becomes of those before them.
@@ -21,7 +21,7 @@ using testing::HubRig;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
-TEST(Reader, CarriesTheLargestFrameAndRefusesOneByteMore) {
+TEST(ConnectionReader, CarriesTheLargestFrameAndRefusesOneByteMore) {
   HubRig rig;
   FakeNode& a = rig.join(0);
   FakeNode& b = rig.join(0);
@@ -39,7 +39,7 @@ TEST(Reader, CarriesTheLargestFrameAndRefusesOneByteMore) {
   EXPECT_TRUE(a.pipe.transport_gone());
 }
 
-TEST(Reader, ClosesForALengthThatClaimsFourGiB) {
+TEST(ConnectionReader, ClosesForALengthThatClaimsFourGiB) {
   for (const std::uint32_t length :
        {65'537u, 0x7FFF'FFFFu, 0x8000'0000u, 0xFFFF'FFF0u, 0xFFFF'FFFFu}) {
     HubRig rig;
@@ -55,7 +55,7 @@ TEST(Reader, ClosesForALengthThatClaimsFourGiB) {
   }
 }
 
-TEST(Reader, ClosesAConnectionThatSpeaksForAnother) {
+TEST(ConnectionReader, ClosesAConnectionThatSpeaksForAnother) {
   HubRig rig;
   FakeNode& a = rig.join(0);
   FakeNode& b = rig.join(0);
@@ -91,7 +91,7 @@ std::string fragment(std::uint32_t offset, std::uint32_t total, const std::strin
   return ids({1, offset, total}) + payload;
 }
 
-TEST(Reader, AnswersEachMalformedFrameWithGoodbye) {
+TEST(ConnectionReader, AnswersEachMalformedFrameWithGoodbye) {
   const Malformed cases[] = {
       {"reserved flag", {.flags = 0x40}, 1, ""},
       {"reserved flag 2", {.flags = 0x80}, 1, ""},
@@ -144,7 +144,7 @@ TEST(Reader, AnswersEachMalformedFrameWithGoodbye) {
   }
 }
 
-TEST(Reader, RefusesHopsFromANode) {
+TEST(ConnectionReader, RefusesHopsFromANode) {
   HubRig rig;
   FakeNode& a = rig.join(0);
   std::vector<std::byte> bytes = HubRig::frame(a, a.id.value(), "x");
@@ -156,7 +156,7 @@ TEST(Reader, RefusesHopsFromANode) {
 }
 
 // Frames before a malformed one were legal when they came, also where all have one header.
-TEST(Reader, DeliversTheFramesBeforeAMalformedOneOfTheSameHeader) {
+TEST(ConnectionReader, DeliversTheFramesBeforeAMalformedOneOfTheSameHeader) {
   HubRig rig;
   FakeNode& a = rig.join(0);
   FakeNode& b = rig.join(0);

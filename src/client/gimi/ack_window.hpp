@@ -12,7 +12,7 @@ namespace gimnet::gimi {
 /// (docs/protocol.md, section 7). Knows no sockets and no clock: it is told the time,
 /// steady_now_ns(). Thread safety: one thread at a time. Time alone never frees: an ACK does, and
 /// the ACK that belongs to a PONG, and what the caller knows to be lost.
-class SendWindow {
+class AckWindow {
  public:
   /// What an event freed.
   struct Freed {
@@ -22,7 +22,7 @@ class SendWindow {
   };
 
   /// `messages_max` 1..kWindowMax; 0: nothing is counted, there is always room.
-  explicit SendWindow(std::size_t messages_max) : messages_max_(messages_max) {}
+  explicit AckWindow(std::size_t messages_max) : messages_max_(messages_max) {}
 
   [[nodiscard]] bool synchronized() const { return messages_max_ != 0; }
   /// For a message of so many bytes. A message always has room where no other waits, whatever its

@@ -1,4 +1,4 @@
-#include "client/gimi/watch_table.hpp"
+#include "client/gimi/watch_queues.hpp"
 
 #include <gtest/gtest.h>
 

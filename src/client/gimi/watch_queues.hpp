@@ -46,9 +46,9 @@ class WatchQueue {
 
 /// The watches of a node, by NIF's numbers. Thread safety: any thread; on_watched() from the
 /// library's only.
-class WatchTable {
+class WatchQueues {
  public:
-  explicit WatchTable(Uplink& uplink) : uplink_(uplink) {}
+  explicit WatchQueues(Uplink& uplink) : uplink_(uplink) {}
 
   struct Begun {
     std::uint32_t number = 0;
