@@ -1,9 +1,16 @@
-"""The rule about the size of a noun: a header with the source of that name."""
+"""The rules about nouns: the size of a header with the source of that name, and the names of classes."""
+
+import re
 
 from tree import CPP_SUFFIXES, HEADER_SUFFIXES
 
 SMALL_HEADER_LINES = 40
 SMALL_HEADER_USERS = 3
+
+# In formatted code a type of a namespace begins its line. The head ends at "{"; at ";" it only declares.
+_TYPE = re.compile(r"^(?:template <[^{;]*>\s+)?(?:class|struct|union|enum(?: class)?) "
+                   r"(?:\w+\([^{;]*?\) |[A-Z]+(?:_[A-Z]+)+ |\[\[.*?\]\] )*(\w+)(?= final| :|\s*\{)[^{;]*\{",
+                   re.MULTILINE)
 
 
 def small_headers_are_shared(tree):
@@ -19,3 +26,16 @@ def small_headers_are_shared(tree):
         count = len(users.get(noun, set()) - {noun})
         if lines[noun] < SMALL_HEADER_LINES and count < SMALL_HEADER_USERS:
             yield f"{header.path}: {lines[noun]} lines for {count} users: move it to one of them"
+
+
+def class_names_exist_once(tree):
+    """Classes, enumerations and unions of src/, of namespaces and of single files alike. A nested type is named
+    together with its class, and is free."""
+    places = {}
+    for file in tree.files(("src",), CPP_SUFFIXES):
+        code = "\n".join(file.code_lines())
+        for match in _TYPE.finditer(code):
+            place = f"{file.path}:{code.count(chr(10), 0, match.start(1)) + 1}"
+            if match[1] in places:
+                yield f"{place}: {match[1]} is the name of a type in {places[match[1]]} already"
+            places.setdefault(match[1], place)

@@ -217,6 +217,21 @@ CASES = {
             {"src/a.hpp": ""} | {f"src/{name}.cpp": '#include "a.hpp"\n' for name in "abc"},
         ],
     ),
+    rules.class_names_exist_once: (
+        [
+            {"src/a.hpp": "class A;\nstruct B {\n  class A {\n  };\n};\n", "src/b.hpp": "class A final : public B {\n};\n"},
+            {"src/a.cpp": "enum class A : char { b };\n", "src/b.cpp": "// class A {\nstruct C::A {\n};\nA f() {\n}\n"},
+            {"src/a.hpp": "struct A {\n};\n", "tests/a_test.cpp": "struct A {\n};\n"},
+            {"src/a.hpp": "template <>\nstruct hash<A> {\n};\ntemplate <>\nstruct hash<B> {\n};\n"},
+        ],
+        [
+            {"src/a.hpp": "class A {\n};\n", "src/b.cpp": "namespace {\nstruct A {\n};\n}\n"},
+            {"src/a.hpp": "enum class A : char { b };\n", "src/b.hpp": "template <class T>\nclass A : public B<T>,\n          C {\n};\n"},
+            {"src/a.hpp": "union A {\n};\n", "src/b.hpp": "template <class T> struct A {\n};\n"},
+            {"src/a.hpp": "class GIMNET_CAPABILITY(\"a\") A {\n};\n", "src/b.hpp": "class GIMNET_SCOPED_CAPABILITY A {\n};\n"},
+            {"src/a.hpp": "struct alignas(64) A {\n};\n", "src/b.hpp": "class [[nodiscard]] A final {\n};\n"},
+        ],
+    ),
     rules.tests_mirror_sources: (
         [
             {"src/base/a.cpp": "", "tests/base/a_test.cpp": ""},
