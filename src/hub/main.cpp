@@ -23,7 +23,7 @@ void raise_descriptor_limit() {
   static_cast<void>(::setrlimit(RLIMIT_NOFILE, &limit));
 }
 
-/// What was asked for goes to standard output, what is wrong to standard error.
+/// Answers go to standard output, complaints to standard error.
 int show(const hub::CommandLineEnding& ending) {
   if (ending.exit_code != 0) {
     std::fputs(ending.text.c_str(), stderr);

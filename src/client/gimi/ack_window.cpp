@@ -27,8 +27,8 @@ bool is_acknowledged(std::uint32_t sequence, std::uint32_t highest, std::uint64_
 
 bool AckWindow::has_room(std::size_t bytes) const {
   if (!synchronized()) return true;
-  // What the receiver's library holds for a program that stands still must not have to wait in a
-  // hub.
+  // The receiver's library holds so much for a program that stands still: no more may be under way,
+  // or it would wait in a hub.
   const bool fits = unacknowledged_ == 0 || unacknowledged_bytes_ + bytes <= kWindowBytesMax;
   // The span keeps the oldest within reach of the bitmap of any ACK.
   return fits && unacknowledged_ < messages_max_ &&

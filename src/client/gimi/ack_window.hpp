@@ -14,7 +14,7 @@ namespace gimnet::gimi {
 /// the ACK that belongs to a PONG, and what the caller knows to be lost.
 class AckWindow {
  public:
-  /// What an event freed.
+  /// The messages that an event freed.
   struct Freed {
     std::size_t acknowledged = 0;
     std::size_t lost = 0;

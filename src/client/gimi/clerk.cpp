@@ -28,7 +28,7 @@ void advance(AckBook::Entry& entry, std::uint32_t sequence) {
 
 bool AckBook::take(const StreamName& sender, const proto::gimi::MessageHeader& data) {
   if (entries_.size() >= kStreamsMax && !entries_.contains(sender)) {
-    // Who begins too many streams loses its own.
+    // A sender that begins too many streams loses its own.
     const auto above = entries_.lower_bound(sender);
     entries_.erase(above != entries_.begin() ? std::prev(above) : above);
   }
@@ -62,13 +62,13 @@ bool AckBook::hold(const StreamName& sender) {
 
 namespace {
 
-/// How often streams are looked after: a quarter of the shortest patience.
+/// The time between two looks at the streams: a quarter of the shortest patience.
 constexpr std::int64_t kTickNs = 50'000'000;
-/// When to try again where the hub had paused the way of an ACK.
+/// The time until the next try if the hub had paused the way of an ACK.
 constexpr std::int64_t kRetryNs = 5'000'000;
 /// ACKs that wait for their way; whoever misses another one asks for it by a PING.
 constexpr std::size_t kPausedAcksMax = 1024;
-/// How long a node that leaves tries to get its last ACKs away.
+/// A node that leaves tries for so long to send its last ACKs.
 constexpr std::int64_t kLastAcksNs = 500'000'000;
 
 }  // namespace

@@ -50,7 +50,7 @@ class AckBook {
     std::uint64_t bitmap = 0;
     bool due = false;
   };
-  /// What is to be acknowledged, now: it is no longer due. Zeros if nothing came from there.
+  /// The messages to acknowledge now; they are no longer due. Zeros if nothing came from there.
   Entry acknowledge(const StreamName& sender);
   /// An acknowledgement could not be sent: it stays due. True: it had become due anew.
   bool hold(const StreamName& sender);

@@ -21,7 +21,7 @@
 namespace gimnet::gimi {
 namespace {
 
-/// What the GIMI header and its extension may add to the application's bytes.
+/// The bytes that the GIMI header and its extension may add to the application's.
 constexpr std::size_t kHeaderRoom = 1024;
 
 /// NIF refuses what its sender still waits with. Less than its window is on its way already: that
@@ -135,7 +135,7 @@ void Core::close() {
   clerk_.stop();
   static_cast<void>(lost());  // NIF tells nothing of a handle that was closed
   {
-    // Whoever waits and leaves now may ask what had become of the connection.
+    // A caller that waits and leaves now may ask what became of the connection.
     NodeState state = state_now();
     const MutexLock lock(mutex_);
     closed_state_ = std::move(state);

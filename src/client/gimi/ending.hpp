@@ -23,7 +23,7 @@ class Ending {
 
   [[nodiscard]] explicit operator bool() const { return !why_.empty(); }
   [[nodiscard]] const std::string& why() const { return why_; }
-  /// What a call answers; `doing` as in "send to 7.17".
+  /// The answer of a call; `doing` as in "send to 7.17".
   [[nodiscard]] Failure failure(std::string_view doing) const {
     return {status_, "cannot " + std::string(doing) + ": " + why_};
   }
@@ -33,7 +33,7 @@ class Ending {
   std::string why_;
 };
 
-/// How long the end of a handle of the program waits for the hub's answer.
+/// The end of a handle of the program waits for so long for the hub's answer.
 inline constexpr std::int32_t kLeaveTimeoutMs = 1000;
 
 /// When a wait ends, as steady_now_ns(); INT64_MAX: never.
@@ -53,7 +53,7 @@ inline constexpr std::int32_t kLeaveTimeoutMs = 1000;
   return static_cast<std::int32_t>(std::min<std::int64_t>(timeout.count(), INT32_MAX));
 }
 
-/// What is left until a deadline, rounded up, as NIF takes it.
+/// The time left until a deadline, rounded up, as NIF takes it.
 [[nodiscard]] inline std::int32_t nif_timeout_until(std::int64_t deadline_ns) {
   if (deadline_ns == INT64_MAX) return -1;
   const std::int64_t left_ns = std::max<std::int64_t>(deadline_ns - steady_now_ns(), 0);

@@ -10,7 +10,7 @@
 #include "gimnet/nif.h"
 #include "proto/control/ctrl_network.hpp"
 
-// What a hub knows, as records of the C++ API. Thread safety: pure functions of the handle.
+// The knowledge of a hub, as records of the C++ API. Thread safety: pure functions of the handle.
 
 namespace gimnet::gimi {
 
@@ -26,7 +26,7 @@ namespace gimnet::gimi {
 /// reached, or names of other hubs may be on their way. Also where the hub did not say.
 [[nodiscard]] bool may_come(nif_node* node, const std::string& name, Timeout timeout);
 
-/// Who asks, and which hub; 0: the own one.
+/// The node that asks, and the hub that is asked; 0: the own one.
 struct Asking {
   nif_node* node = nullptr;
   std::uint32_t hub_id = 0;

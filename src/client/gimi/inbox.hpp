@@ -115,7 +115,7 @@ class Inbox {
   /// Overwrites the oldest messages beyond kUnaskedBytesMax; the newest one stays.
   void bound_unasked() GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool is_room_wanted(const MessageQueue& queue) GIMNET_REQUIRES(mutex_);
-  /// What a change of a queue has to be told, without the lock.
+  /// The news that a change of a queue leaves, to be told without the lock.
   struct News {
     bool room = false;
     bool more = false;

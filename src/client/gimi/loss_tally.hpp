@@ -20,8 +20,8 @@ struct Loss {
   [[nodiscard]] explicit operator bool() const { return !words.empty(); }
 };
 
-/// What a hub's report says to people: the reason's name, and what it means where the name does not
-/// tell.
+/// The words of a hub's report for people: the reason's name, and its meaning if the name does not
+/// tell it.
 [[nodiscard]] inline std::string report_words(std::string_view reason) {
   using Meaning = std::pair<std::string_view, std::string_view>;
   constexpr std::array<Meaning, 9> kMeanings{
@@ -42,7 +42,7 @@ struct Loss {
   return words;
 }
 
-/// What a hub's report of that reason, which has that name, says.
+/// The loss that a hub's report of that reason tells; `name` is the reason's.
 [[nodiscard]] inline Loss reported_loss(std::uint32_t reason, std::string_view name) {
   return {reason < 64 ? static_cast<LossReason>(reason) : LossReason::none, report_words(name)};
 }

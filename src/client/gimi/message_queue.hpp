@@ -52,7 +52,7 @@ class MessageQueue {
   [[nodiscard]] bool tells_silence();
   [[nodiscard]] std::int64_t silence_ms() const { return silence_.count(); }
 
-  /// What went out of it since the last call, popped or overwritten.
+  /// The messages that left it since the last call, popped or overwritten.
   [[nodiscard]] std::vector<TakenMessages> take_taken() { return std::exchange(taken_, {}); }
 
   [[nodiscard]] std::size_t size() const { return entries_.size(); }

@@ -24,7 +24,7 @@ class StreamEpochs {
     begins,   ///< of an epoch that replaces the current one
     former,   ///< of an epoch that was replaced: drop it
   };
-  /// What a message of that epoch would be. Changes nothing.
+  /// Tells what a message of that epoch would be. Changes nothing.
   [[nodiscard]] Step look(std::uint32_t epoch) const;
   /// The message was taken: its epoch is the current one. REQUIRES: look() is not `former`.
   void take(std::uint32_t epoch);

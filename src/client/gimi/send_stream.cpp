@@ -81,7 +81,7 @@ void SendStream::hold(BytesView data) {
   held_.emplace(data.span().begin(), data.span().end());
 }
 
-/// What a program was told to be held could not be sent yet.
+/// Puts back a message that the program was told to be held: it could not be sent yet.
 void SendStream::hold_again(std::vector<std::byte> data) {
   if (held_) {
     ++counts_.skipped;  // a newer one came meanwhile

@@ -17,7 +17,7 @@ namespace gimnet::gimi {
 
 class SendStream;
 
-/// Who looks after streams with messages that wait for an ACK.
+/// Looks after streams with messages that wait for an ACK.
 class StreamKeeper {
  public:
   /// The stream wants tick() from now on until it answers false. Called without a lock.
@@ -27,7 +27,7 @@ class StreamKeeper {
   ~StreamKeeper() = default;
 };
 
-/// Where a service is that a stream leads to.
+/// The place of a service that a stream leads to.
 struct ServicePlace {
   std::uint32_t group = 0;     ///< 0: none at the moment
   std::uint32_t provider = 0;  ///< 0: nobody
@@ -36,7 +36,7 @@ struct ServicePlace {
   bool accepts = false;  ///< it takes data, and gives none
   bool latest = false;   ///< of Delivery::latest
 
-  /// Where messages go; 0: nobody takes them.
+  /// The destination of messages; 0: nobody takes them.
   [[nodiscard]] std::uint32_t destination() const { return provider != 0 ? group : 0; }
 };
 
@@ -82,7 +82,7 @@ class SendStream {
   void on_lost(std::uint32_t sequence, const Loss& why) GIMNET_EXCLUDES(mutex_);
   /// Messages may be lost, and that is why: ask.
   void on_doubt(const Loss& why) GIMNET_EXCLUDES(mutex_);
-  /// What waits is lost, or nobody will ever tell.
+  /// Messages that wait are lost, or nobody will ever tell.
   void on_broken(const Loss& why) GIMNET_EXCLUDES(mutex_);
   /// The service is somewhere else now: what waits for an ACK from its former place gets none any
   /// more.

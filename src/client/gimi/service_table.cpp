@@ -235,7 +235,7 @@ void ServiceTable::forget_unused(const Subscribed& service) {
   subscribed_.erase(service->name());
 }
 
-/// What is still on its way of a subscription that ended is no loss.
+/// Messages on their way of a subscription that ended are no loss.
 void ServiceTable::end_groups(SubscribedService& service) {
   for (const std::uint32_t group : service.groups) {
     forget_group(service, group);

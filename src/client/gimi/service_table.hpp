@@ -19,9 +19,9 @@
 
 namespace gimnet::gimi {
 
-/// What a node provides and what it subscribed, by name and by group id. Thread safety: any thread.
-/// What was advertised once stays in the table until the node is closed; a subscription goes with
-/// its last handle.
+/// The services that a node provides and subscribed, by name and by group id. Thread safety: any
+/// thread. An advertised service stays in the table until the node is closed; a subscription goes
+/// with its last handle.
 class ServiceTable {
  public:
   /// `on_moved` is called without a lock of this table but the asking one, for each service that is
@@ -85,7 +85,7 @@ class ServiceTable {
   /// The hub does not keep a message of that own service; `sent`: its header, if that is known.
   void on_not_retained(std::uint32_t group, const std::optional<proto::gimi::MessageHeader>& sent)
       GIMNET_EXCLUDES(mutex_);
-  /// What a NIF_SERVICE_MOVED or NIF_OWN_SERVICE_MOVED says of a refusal.
+  /// The refusal that a NIF_SERVICE_MOVED or NIF_OWN_SERVICE_MOVED tells; nothing: none.
   [[nodiscard]] static std::optional<Failure> refusal_of(const nif_incoming& moved);
   [[nodiscard]] Place on_service_moved(const nif_incoming& moved) GIMNET_EXCLUDES(mutex_);
   /// `unknown`: nor is one of an earlier service of that name, which had `former`.

@@ -158,7 +158,7 @@ class SubscribedService {
     std::uint32_t sequence = 0;
     friend bool operator==(const Position&, const Position&) = default;
   };
-  /// What a message would be. Changes nothing.
+  /// Tells what a message would be. Changes nothing.
   [[nodiscard]] StreamEpochs::Step look(const Position& message) GIMNET_EXCLUDES(mutex_);
   /// Puts one of its messages into the queues of all subscribers. The message that came last may
   /// come once more, with what is retained: it goes to subscribers of which nothing came yet.
@@ -176,7 +176,7 @@ class SubscribedService {
   bool retained = false;
   /// A stream of this node leads there; guarded by the table's asking mutex.
   bool followed = false;
-  /// Where it is; guarded by the table's mutex.
+  /// Its place now; guarded by the table's mutex.
   ServicePlace place;
   /// Group ids that lead to it, the youngest last; guarded by the table's mutex.
   std::vector<std::uint32_t> groups;

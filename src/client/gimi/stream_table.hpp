@@ -59,7 +59,7 @@ class StreamTable final : public StreamKeeper {
   void on_refused(const StreamName& name, const proto::gimi::MessageHeader& header, const Loss& why)
       GIMNET_EXCLUDES(mutex_);
 
-  /// What the hub says of a frame of this node that it could not deliver.
+  /// The hub's word on a frame of this node that it could not deliver.
   struct Report {
     StreamName name;
     bool has_key = true;  ///< false: it may be any stream to that peer; of a group there is one

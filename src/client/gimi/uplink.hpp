@@ -21,7 +21,7 @@ class Node;
 namespace gimnet::gimi {
 
 [[nodiscard]] Status status_of(nif_status status);
-/// What NIF answered in this thread just now, as a Failure; `doing` as in "send to 7.17".
+/// The last answer of NIF in this thread, as a Failure; `doing` as in "send to 7.17".
 [[nodiscard]] Failure failure_of(nif_status status, std::string_view doing);
 
 /// Does the id stand for all nodes of a hub, or of the network?
@@ -29,7 +29,7 @@ namespace gimnet::gimi {
   return index_of(NodeId{peer.id}) == kEveryIndex;
 }
 
-/// Where a message goes and how.
+/// The destination of a message, and the terms it goes on.
 struct Envelope {
   std::uint32_t to = 0;
   nif_kind kind = NIF_UNICAST;

@@ -89,7 +89,7 @@ Outcome<WatchQueues::Begun> WatchQueues::watch(const std::string& pattern,
       if (end_) begun.queue->end(end_);
     }
   }
-  // What came meanwhile was held back.
+  // NIF held back the events that came meanwhile.
   static_cast<void>(nif_deliver(uplink_.node()));
   if (status != NIF_OK) return failure;
   return begun;
