@@ -158,7 +158,8 @@ os.register_at_fork(after_in_child=Joining.begin_anew)  # another thread may hav
 
 
 class RawSet:
-    """A wait set of the library and its descriptor, which are closed when nobody has it any more."""
+    """A wait set of the library and its descriptor, which are closed when nobody has it any more: not while a
+    thread polls it, for another thread may be given the same descriptor at once."""
 
     def __init__(self) -> None:
         made, descriptor = ctypes.c_uint64(), ctypes.c_int32()
@@ -212,6 +213,7 @@ class Waitable(Blocking):
                 if status != _c.GIMI_TAKEN:
                     self.check(status)
                     self._set = made
+                    self.check(_c.GIMI_OK if self._handle else _c.GIMI_CLOSED)  # close() did not see the set
             return self._set
 
     def leave_own_set(self) -> None:
@@ -278,16 +280,24 @@ class Stream(Waitable, Generic[Got]):
 
 
 class Exit:
-    """Closes all nodes when the program ends, before Python waits for its threads."""
+    """Closes all nodes and wait sets when the program ends, before Python waits for its threads."""
 
-    nodes: weakref.WeakSet[Handle] = weakref.WeakSet()
+    closed: weakref.WeakValueDictionary[int, Handle] = weakref.WeakValueDictionary()  # nodes and sets
     begun = False
+
+    @classmethod
+    def add(cls, number: int, made: Handle) -> None:
+        cls.closed[number] = made
+        if cls.begun:
+            made.close()
 
     @classmethod
     def run(cls) -> None:
         cls.begun = True
-        for node in list(cls.nodes):
-            node.close()
+        for reference in cls.closed.valuerefs():  # a copy: other threads add theirs
+            made = reference()
+            if made is not None:
+                made.close()
 
 
 # concurrent.futures ends its threads in the same way: atexit comes after the wait for them.

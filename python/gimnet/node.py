@@ -128,7 +128,7 @@ class Node(Waitable):
         super().__init__(handle)
         self._senders: Dict[Union[str, Peer], int] = {}
         self._lock = threading.Lock()  # guards _senders
-        Exit.nodes.add(self)
+        Exit.add(handle, self)
 
     def __enter__(self) -> Node:
         return self

@@ -18,13 +18,12 @@ class WaitSet(Handle):
     tells those that have something, again and again until it was taken. Each is in at most one set."""
 
     def __init__(self) -> None:
-        super().__init__(0, kept=True)
-        self._raw = RawSet()
-        self._handle, self._kept = self._raw.handle, False
+        raw = RawSet()
+        self._raw: Optional[RawSet] = raw
+        super().__init__(raw.handle)
         self._members: Dict[int, Tuple[Waitable, Any]] = {}
         self._ahead: Dict[int, Tuple[Waitable, Any]] = {}  # of them, those that fetched ahead before they came
-        self._over = False
-        Exit.nodes.add(self)
+        Exit.add(self._handle, self)
 
     def __enter__(self) -> WaitSet:
         return self
@@ -62,15 +61,16 @@ class WaitSet(Handle):
         if ahead:
             return ahead
         ready, count = (_c.gimi_ready * _READY_MAX)(), ctypes.c_size_t()
-        end = end_of(timeout)
-        while True:
-            status = _c.lib.gimi_wait_set_wait(self._handle, ready, _READY_MAX, ctypes.sizeof(_c.gimi_ready), 0, count)
+        end, raw, status = end_of(timeout), self._raw, _c.GIMI_CLOSED
+        while raw is not None:
+            status = _c.lib.gimi_wait_set_wait(raw.handle, ready, _READY_MAX, ctypes.sizeof(_c.gimi_ready), 0, count)
+            if self._raw is None:
+                raw.wake()  # the next thread that waits
+                status = _c.GIMI_CLOSED
             left = left_ms(end, TIMEOUT_MS_MAX) if status == _c.GIMI_TIMEOUT else 0
             if left <= 0:
                 break
-            self._raw.poll(left)
-        if self._over:
-            status = _c.GIMI_CLOSED
+            raw.poll(left)
         if status == _c.GIMI_TIMEOUT:
             raise errors.Timeout(f"nothing came within {timeout} s")
         self.check(status)
@@ -90,16 +90,19 @@ class WaitSet(Handle):
     def fileno(self) -> int:
         """A descriptor for select, poll and asyncio: readable while wait(0) gives something. Read nothing from it,
         and do not close it."""
-        if not self._handle:
+        raw = self._raw
+        if raw is None:
             raise errors.Closed("the wait set was closed")
-        return self._raw.descriptor
+        return raw.descriptor
 
     def close(self) -> None:
         """Threads that wait raise Closed. Its members are in no set then."""
-        for source, _ in list(self._members.values()):
+        self._handle, raw, self._raw = 0, self._raw, None
+        if raw is None:
+            return
+        for number, (source, _) in list(self._members.items()):
+            _c.lib.gimi_wait_set_remove(raw.handle, number)
             source.shared = False
         self._members.clear()
         self._ahead.clear()
-        self._over = True
-        self._raw.wake()
-        super().close()
+        raw.wake()

@@ -11,7 +11,8 @@ from support.waiting import PATIENCE_S
 
 def program(lines, hub, *arguments):
     """A Python program with a node `node` named `name`."""
-    text = f"import gimnet, os, sys, threading\nnode = gimnet.connect('{arguments[0]}', hub={hub.url!r})\n{lines}"
+    text = (f"import gimnet, os, sys, threading\nhub = {hub.url!r}\n"
+            f"node = gimnet.connect({arguments[0]!r}, hub=hub)\n{lines}")
     return subprocess.Popen([sys.executable, "-c", text], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                             text=True)
 

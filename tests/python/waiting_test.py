@@ -219,6 +219,11 @@ waits, subscription = gimnet.WaitSet(), node.subscribe("x/y")
 waits.add(node)
 for call in (waits.wait, subscription.receive, gimnet.WaitSet().wait, node.watch("nobody/*").__iter__().__next__):
     threading.Thread(target=lambda call=call: [call() for _ in range(9)]).start()
+def late(make, wait):
+    threading.main_thread().join()  # until its part of the end is over
+    wait(make())
+threading.Thread(target=late, args=(gimnet.WaitSet, gimnet.WaitSet.wait)).start()
+threading.Thread(target=late, args=(lambda: gimnet.connect("b", hub=hub), gimnet.Node.receive)).start()
 """
         process = program(lines, self.hub, "a")
         self.assertEqual((process.communicate(timeout=PATIENCE_S), process.returncode), (("", ""), 0))
