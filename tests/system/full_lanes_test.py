@@ -21,7 +21,9 @@ KEY = 8
 class Flooded(unittest.TestCase):
     def test_echo_of_a_flooded_reader_names_who_floods(self):
         """The reader stands still while another node fills half of its lane, and its stream more than the rest."""
-        hub = Hub(self, "--limit", "lane1_bytes=65536", "--limit", "silent_ms=60000", "--limit", "socket_send_bytes=4096")
+        # However long that takes, the hub neither closes the reader nor drops what the other node sent with BLOCK.
+        times = [word for name in ("silent_ms", "block_ms", "slow_consumer_ms") for word in ("--limit", f"{name}=600000")]
+        hub = Hub(self, "--limit", "lane1_bytes=65536", "--limit", "socket_send_bytes=4096", *times)
         provider = Client(self, hub).join("r")
         group = provider.ask(NS, 7, text(3, "s"))[3]
         echo = start_gimnet(self, hub, "echo", "r/s", "--raw")
@@ -62,7 +64,10 @@ class Flooded(unittest.TestCase):
         def is_said():
             publish(1)
             return re.search(said, echo.err)
-        wait_until(is_said, "the sentence")
+        try:
+            wait_until(is_said, "the sentence")
+        except AssertionError as late:
+            raise AssertionError(f"{late}. Told: {echo.err}; {hub.status()}") from None
         echo.signal(signal.SIGINT)
         self.assertEqual(echo.wait(), 130, echo.err)
         self.assertNotIn("too slow", echo.err)
