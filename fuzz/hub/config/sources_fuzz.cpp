@@ -106,7 +106,7 @@ void check_options(const HubOptions& options) {
   FUZZ_MUST(options.links.accepted.silent_ms > options.links.accepted.keep_alive_ms);
 }
 
-/// What is printed is read as what it was.
+/// A printed configuration is read as the same configuration.
 void check_printed(const Configuration& configuration, const File& file) {
   const ReadConfiguration again = file.read(print(configuration));
   FUZZ_MUST(again.faults.empty());

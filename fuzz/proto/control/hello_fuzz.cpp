@@ -15,7 +15,8 @@ using namespace gimnet;
 using namespace gimnet::proto;
 using Bytes = std::span<const std::byte>;
 
-/// What is refused early is refused at every later byte too; 8 bytes are enough to decide.
+/// An opening that is refused early is refused at every later byte too; 8 bytes are enough to
+/// decide.
 void check_opening_in_pieces(Bytes bytes) {
   auto result = Opening::need_more;
   for (std::size_t size = 0; size <= bytes.size() && size <= 2 * kOpeningSize; ++size) {

@@ -64,7 +64,7 @@ bool matches_naively(const Parts& pattern, const Parts& name) {
   return fits[0][0];
 }
 
-/// What the hub finds names by without comparing each.
+/// Checks the parts of a pattern by which the hub finds names without comparing each.
 void check_pattern(std::string_view text, std::string_view name) {
   const std::optional<Pattern> pattern = Pattern::parse(text);
   FUZZ_MUST(pattern.has_value() == valid_naively(text, true));

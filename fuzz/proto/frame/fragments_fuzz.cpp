@@ -27,7 +27,8 @@ struct Step {
   std::vector<std::byte> payload;
 };
 
-/// What stands at an offset of a message, so that a byte in a wrong place is seen.
+/// The byte at an offset of a message. It differs by offset, so that a byte in a wrong place is
+/// seen.
 std::byte content(std::uint32_t stream, std::uint32_t message, std::uint32_t offset) {
   return static_cast<std::byte>(31 * stream + 7 * message + offset);
 }

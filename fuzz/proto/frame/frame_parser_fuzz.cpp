@@ -19,7 +19,7 @@ using Bytes = std::span<const std::byte>;
 
 constexpr std::uint32_t kLengthMax = 4096;
 
-/// Where frames begin, and where reading ended, by the plainest code there is.
+/// The beginnings of frames, and the end of reading, by the plainest code there is.
 struct Cut {
   std::vector<std::size_t> frames;
   std::size_t end = 0;

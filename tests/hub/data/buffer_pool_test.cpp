@@ -46,7 +46,7 @@ TEST_F(BufferPoolTest, ChunksAreAtLeastAsLargeAsAskedFor) {
   }
 }
 
-// What the allocator rounds up, the budget would not know of.
+// The budget would not know of the bytes by which the allocator rounds up.
 TEST_F(BufferPoolTest, ASharedChunkIsAsMuchMemoryAsTheAllocatorGives) {
   for (const std::uint32_t bytes :
        {1u, 256 - kBufferRoom, 1'024 - kBufferRoom, 4'096 - kBufferRoom}) {
@@ -91,7 +91,7 @@ TEST_F(BufferPoolTest, ALentSlabIsNotReusedBeforeItsLoanEnds) {
   EXPECT_EQ(pool.take_slab().get(), memory) << "reclaimed";
 }
 
-// What one burst lent does not stay for ever, though nobody asks for a slab again.
+// Chunks that one burst lent do not stay for ever, though nobody asks for a slab again.
 TEST_F(BufferPoolTest, TakesBackWhatWasLent) {
   std::vector<Buffer*> loans;
   std::vector<BufferRef> used;
@@ -174,7 +174,7 @@ TEST_F(BufferPoolTest, LendingABorrowedSlabLendsTheSlabBehindIt) {
   BufferPool::end_loan(slab.get());
 }
 
-// Where memory is scarce a frame takes what it has, not the room of the next class.
+// If memory is scarce, a frame takes its own size and not the room of the next class.
 TEST_F(BufferPoolTest, AnExactChunkIsFreedAfterItsUse) {
   const std::size_t kept = pool.kept_chunk_bytes();
   {

@@ -154,7 +154,7 @@ TEST(Attacher, GoesOnAfterManyCuts) {
   EXPECT_EQ(b.texts(), sent);
 }
 
-// What a node sent and the hub took is told in WELCOME, so that the node sends the rest.
+// WELCOME tells how much the hub took of what the node sent, so that the node sends the rest.
 TEST(Attacher, TellsWhatItTookFromANodeThatWasCut) {
   HubRig rig;
   FakeNode& a = rig.join(0, kResume);
@@ -214,7 +214,7 @@ std::uint64_t flood(HubRig& rig, FakeNode& from, const FakeNode& to, std::uint64
   return first + count;
 }
 
-/// What came is in order and once, and what did not was announced.
+/// Frames came in order and once, and those that did not come were announced.
 void expect_gaps_announced(const FakeNode& node, std::uint64_t sent) {
   std::int64_t last = -1;
   for (const auto& frame : node.frames) {

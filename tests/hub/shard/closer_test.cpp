@@ -167,8 +167,8 @@ TEST(Closer, TellsSendersWhatAResumeBufferLost) {
   }
 }
 
-// What its shard kept for its services is found by the id that it has now, not by the one under
-// which it sent it.
+// The shard finds the messages that it kept for a provider by the id that the provider has now, not
+// by the one under which it sent them.
 TEST(Closer, ARenumberedProvidersLastMessagesGoWithIt) {
   HubRig rig;
   FakeNode& provider = rig.join(0, {.resume = true});

@@ -79,8 +79,8 @@ class World {
     EXPECT_EQ(rig_.ledger().queued, 0u);
     std::uint64_t got = 0;
     for (const auto& [node, count] : got_) got += count;
-    // What was handed to the kernel and lost with a connection that broke counts as delivered
-    // without resume.
+    // Without resume, frames that the kernel took and that a broken connection lost count as
+    // delivered.
     EXPECT_GE(rig_.ledger().delivered, got);
   }
 

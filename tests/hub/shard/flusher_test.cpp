@@ -256,7 +256,7 @@ TEST_F(FlusherOfAResumer, TimesOutANodeThatNeverConfirms) {
   EXPECT_EQ(rig.dropped(DropReason::timed_out), 16u);
 }
 
-// What the hub answers it is taken, but nothing of what waits.
+// The node takes the answers of the hub, but nothing of the frames that wait.
 TEST_F(FlusherOfAResumer, TimesOutANodeThatNeverConfirmsButAsks) {
   send(20);
   rig.settle();

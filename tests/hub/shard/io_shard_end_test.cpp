@@ -14,7 +14,7 @@ using testing::HubRig;
 
 constexpr auto kDrop = static_cast<std::uint8_t>(proto::Policy::drop);
 
-// What waits between shards when the hub ends is let go on both sides.
+// Frames that wait between shards when the hub ends are let go on both sides.
 TEST(IoShard, EndsWithMailUnderWayAndWithFramesOfAnotherShardWaiting) {
   HubRig rig(2);
   FakeNode& a = rig.join(0);
@@ -42,7 +42,7 @@ TEST(IoShard, EndsWithMailUnderWayAndWithFramesOfAnotherShardWaiting) {
   }
 }
 
-// What a turn knows of a run keeps that run's buffer, here another shard's, only until the turn is
+// A turn remembers a run, and so keeps its buffer, here another shard's, only until the turn is
 // over.
 TEST(IoShard, KeepsNoBufferForTheNextTurnThatNobodyWaitsFor) {
   Limits limits;

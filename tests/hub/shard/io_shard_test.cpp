@@ -243,7 +243,7 @@ TEST(IoShard, RunsOnAThreadOfItsOwnUntilItIsStopped) {
   EXPECT_GE(rig.sum(&ShardCounters::turns), 1u);
 }
 
-// What waited for the former id is lost and counted, and the node begins anew.
+// Frames that waited for the former id are lost and counted, and the node begins anew.
 TEST(IoShard, ARenumberedNodeIsToldAndBeginsAnew) {
   HubRig rig(1);
   FakeNode& a = rig.join(0);
@@ -324,14 +324,14 @@ TEST(IoShard, ASubscriberThatChangesItsTermsMissesNothingInBetween) {
   EXPECT_THAT(viewer.texts(), ElementsAre("plain", "published", "paced", "held 1", "held 2",
                                           "held 3", "behind them"));
   EXPECT_EQ(rig.ledger().dropped, 0u);
-  // Who has only just subscribed gets nothing before its shard knows how much.
+  // A new subscriber gets nothing before its shard knows how much.
   FakeNode& other = rig.join(1);
   rig.publish_paced_group(5, provider.id, {&viewer, &other});
   say("too soon");
   EXPECT_THAT(other.frames, IsEmpty());
 }
 
-// Whoever held it releases the id that it had, which leads to nobody.
+// The outbox that held it releases the id that it had, which leads to nobody.
 TEST(IoShard, AHeldNodeThatIsRenumberedIsReadAgain) {
   Limits limits;
   limits.lane1_bytes = 64 * 1024;

@@ -177,7 +177,7 @@ class World {
     publish_members();
     rig_.pace(*each.node, group_, each.terms, retain_);
     if (begins) answer(each);
-    // What its own shard has not handed over yet may come before the last routed message.
+    // Messages that its own shard has not handed over yet may come before the last routed one.
     if (begins) each.repeats_up_to = sequence_;
     if (begins && retain_ && std::exchange(each.fresh, false)) each.first_at_least = last_routed_;
     if (!each.resume && begins) rig_.turn_shard(each.node->shard.value());
@@ -302,7 +302,7 @@ class World {
     }
     take_frames(each);
     if (each.subscribed && each.counted != each.number) answer(each);
-    // What was said on the broken connection may be lost.
+    // Words on the broken connection may be lost.
     credit(each, each.credited);
     if (each.resume && connected(node))
       rig_.send_flow(node, proto::flow::Confirm{node.data_frames});

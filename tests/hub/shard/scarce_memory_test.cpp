@@ -3,7 +3,7 @@
 
 #include "tests/hub/shard/support/hub_rig.hpp"
 
-// What a shard does while less than a third of the hub's memory budget is free.
+// Tests a shard while less than a third of the hub's memory budget is free.
 
 namespace gimnet::hub {
 namespace {

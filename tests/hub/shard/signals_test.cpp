@@ -231,7 +231,7 @@ TEST(Signals, WhoHasNoRoomForResumeIsClosed) {
   EXPECT_FALSE(rig.connection(a)->connected);
 }
 
-// What a node has to say about what it took may lie behind the data for which it is held.
+// The words of a node about what it took may lie behind the data for which it is held.
 TEST(Signals, AHeldNodeThatMustConfirmIsRead) {
   Limits limits;
   limits.resume_bytes = 4'096;

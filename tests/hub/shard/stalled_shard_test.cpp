@@ -5,8 +5,8 @@
 
 #include "tests/hub/shard/support/hub_rig.hpp"
 
-// What a shard judges by the clock after it stood still itself: stopped, starved, or busy with
-// others.
+// Tests the judgements by the clock of a shard that stood still itself: stopped, starved, or busy
+// with others.
 
 namespace gimnet::hub {
 namespace {

@@ -21,7 +21,7 @@
 #include "tests/hub/shard/support/hub_rig.hpp"
 #include "tests/net/support/connected_sockets.hpp"
 
-// What a shard's turn costs in system calls, as the kernel counts them: one wait, one read of each
+// The price of a shard's turn in system calls, as the kernel counts them: one wait, one read of a
 // connection that has something, one write of each that gets something, whatever the number of
 // frames. Instructions, which perf/instructions counts, do not show what the kernel does. None of
 // this depends on how fast anything is.

@@ -3,7 +3,7 @@
 
 #include "tests/hub/shard/support/hub_rig.hpp"
 
-// What a node is told at its return, before all that waits for it.
+// Tests the words that a node gets at its return, before all that waits for it.
 
 namespace gimnet::hub {
 namespace {

@@ -270,7 +270,7 @@ TEST(CheckHeader, NamesEachCause) {
   }
 }
 
-// What stands before the payload by these flags would be read as the payload.
+// The bytes that these flags put before the payload would be read as the payload.
 TEST(CheckHeader, KnowsWhichFlagsAKindMayCarry) {
   for (const Kind kind : {Kind::flow, Kind::link, Kind::ns, Kind::ctrl}) {
     const bool for_this_connection = kind == Kind::flow || kind == Kind::link;

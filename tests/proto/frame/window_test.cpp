@@ -13,7 +13,7 @@ constexpr std::uint32_t kTotal = 10 * kWindowDefault;
 
 std::uint32_t under_way(const SendWindow& window) { return window.sent() - window.taken(); }
 
-/// What the sender is told when so many were received.
+/// The word to the sender when so many were received.
 std::optional<Taken> told(ReceiveWindow& window, std::uint32_t received) {
   if (!window.due(received)) return std::nullopt;
   return window.tell(received);

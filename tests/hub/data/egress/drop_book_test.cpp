@@ -88,7 +88,7 @@ TEST(DropBook, CountsAFrameForEachOfItsRecipients) {
   EXPECT_TRUE(flush(book, 2'000).empty());
 }
 
-// What is to be written again after a break may come from many senders, one behind the other.
+// Frames that are written again after a break may come from many senders, one behind the other.
 TEST(DropBook, ReportsEachOfFramesWithDifferentHeaders) {
   Tally tally;
   DropBook book(tally, 10, 4'096);

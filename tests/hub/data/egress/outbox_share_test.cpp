@@ -66,7 +66,7 @@ class OutboxShare : public ::testing::Test {
     rig.lease.begin_turn(0);
     ASSERT_FALSE(rig.lease.scarce());
   }
-  /// What the share has room for yet.
+  /// The bytes for which the share has room yet.
   std::uint64_t room() { return share - connection.outbox.held_bytes(); }
   std::vector<std::string> starts() {
     connection.peer.set_room(MemoryPeer::kAll);

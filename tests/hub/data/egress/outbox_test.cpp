@@ -200,8 +200,8 @@ TEST(Outbox, LatestOfAMessageUnderWayIsNotReplaced) {
   EXPECT_TRUE(rig.ledger_exact());
 }
 
-// What replaced an older message waits like it: counted against the budget, and out of its slab if
-// it is small.
+// A message that replaced an older one waits like it: counted against the budget, and out of its
+// slab if it is small.
 TEST(Outbox, WhatReplacedAnOlderMessageIsSettledToo) {
   EgressRig rig;
   TestConnection connection(rig);

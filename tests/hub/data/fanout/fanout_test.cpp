@@ -34,7 +34,7 @@ TEST(Fanout, NeighbouringFramesBecomeOneEntry) {
   EXPECT_EQ(rig.fanout.take_posted(), 0u);
 }
 
-/// What the other shard gets, entry by entry, as the payloads of its frames.
+/// The mail of the other shard, entry by entry, as the payloads of its frames.
 std::vector<std::vector<std::string>> entries_of(RouteRig& rig) {
   std::vector<std::vector<std::string>> entries;
   rig.mailbox_there.drain(
@@ -162,7 +162,7 @@ TEST(Fanout, DropsSinglyWhatIsTooLarge) {
   EXPECT_TRUE(rig.ledger_exact());
 }
 
-// What fits between those that do not is one thing, and so is what does not fit.
+// Neighbours that fit become one entry, and neighbours that do not fit are one drop.
 TEST(Fanout, KeepsTheOrderOfWhatIsNotTooLarge) {
   RouteRig rig;
   Recipient& a = rig.add_here(2);

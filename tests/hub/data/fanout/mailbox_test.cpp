@@ -66,7 +66,7 @@ TEST(Mailbox, IsCrowdedAtHalfItsBoundOfDeliveriesAndNeverFullForThem) {
   EXPECT_FALSE(mailbox.crowded(kSender));
 }
 
-// What was fetched and not taken waits in its order, and counts as waiting.
+// Entries that were fetched and not taken wait in their order, and count as waiting.
 TEST(Mailbox, StopsWhereItIsTold) {
   Waker waker;
   Mailbox mailbox(2, {.entries = 80, .bytes = 1'000'000}, waker);

@@ -97,7 +97,7 @@ struct Side {
       all += " " + std::to_string(dropped);
     return all;
   }
-  /// What was received, however it was cut into runs.
+  /// The bytes that were received, however they were cut into runs.
   std::string bytes() const {
     std::string all;
     for (const std::string& each : received) all += each;

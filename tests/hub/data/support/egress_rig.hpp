@@ -12,7 +12,7 @@
 
 namespace gimnet::hub::testing {
 
-/// What an outbox told its senders, as text: "pause 7.1", "hold 7.1".
+/// Keeps the words of an outbox to its senders, as text: "pause 7.1", "hold 7.1".
 struct FakeSignals final : SenderSignals {
   void pause(NodeId sender, const proto::flow::Target&) override { say("pause ", sender); }
   void resume(NodeId sender, const proto::flow::Target&) override { say("resume ", sender); }
@@ -33,7 +33,7 @@ struct TestFrame {
   std::uint32_t dst = 99;
 };
 
-/// What all outboxes of a shard share, and frames in a slab as a read leaves them there.
+/// The parts that all outboxes of a shard share, and frames in a slab as a read leaves them there.
 class EgressRig {
  public:
   explicit EgressRig(Limits given = {})

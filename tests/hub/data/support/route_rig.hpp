@@ -79,7 +79,7 @@ class RouteRig {
     }
     return run;
   }
-  /// What stands in the other shard's mailbox: frames of each entry.
+  /// Takes the other shard's mail: the number of frames of each entry.
   std::vector<std::uint32_t> take_mail() {
     std::vector<std::uint32_t> entries;
     mailbox_there.drain(

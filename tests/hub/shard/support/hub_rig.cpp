@@ -201,8 +201,8 @@ void HubRig::turn_shard(std::size_t shard) {
   if (!released_ && next_index_ <= kGaugedSlots) check_sessions(sums);
 }
 
-/// What the sessions came to is what the shards came to, but for drops of which nobody knows for
-/// whom the frame was.
+/// The counts of the sessions add up to those of the shards, but for drops of which nobody knows
+/// for whom the frame was.
 void HubRig::check_sessions(const Ledger& sums) const {
   SessionCounts all;
   for (std::size_t shard = 0; shard < shards_.size(); ++shard) {

@@ -26,7 +26,7 @@ struct FrameSpec {
   std::optional<std::uint32_t> src = std::nullopt;  ///< absent: the sending node's id
 };
 
-/// How a node joins, or comes back.
+/// The terms on which a node joins, or comes back.
 struct JoinSpec {
   bool resume = false;
   std::uint64_t epoch = 77;
@@ -86,7 +86,7 @@ class HubRig {
                                                     const std::string& payload,
                                                     const FrameSpec& spec = {});
 
-  /// What a poller would say of the connections of that shard.
+  /// The answer of a poller about the connections of that shard.
   [[nodiscard]] std::vector<Ready> ready(std::size_t shard);
   [[nodiscard]] IoShard& shard(std::size_t shard) { return *shards_[shard]; }
   /// One turn of one shard, or of each in order. Checks the ledger after all.
@@ -95,7 +95,7 @@ class HubRig {
   /// Turns until nothing moves any more, and each node read what came for it.
   void settle();
   void settle_without_reading();
-  /// What a hub does at its end, when its threads are gone.
+  /// Lets go as a hub does at its end, when its threads are gone.
   void let_go();
   /// Starts the threads of all shards and waits for their end: each was told to stop before.
   void run_threads();
