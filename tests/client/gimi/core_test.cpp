@@ -15,7 +15,7 @@
 #include "proto/frame/taken.hpp"
 #include "tests/client/gimi/support/conversation.hpp"
 
-// What becomes of those who wait when no connection will come any more.
+// Tests the fate of callers that wait when no connection will come any more.
 
 namespace gimnet::gimi {
 namespace {

@@ -36,7 +36,7 @@ class HeldBehindAnother : public Conversation {
     settle_down();
   }
 
-  /// What the hub said before was seen to by the node.
+  /// Returns when the node has handled everything that the hub said before.
   void settle_down() {
     const std::string text = "x";
     answer({++sequence_, MessageOperation::data, 0, 0}, std::as_bytes(std::span(text)));
@@ -65,8 +65,8 @@ TEST_F(HeldBehindAnother, GoesWhenTheAckOvertakesTheEndOfSending) {
 
 TEST_F(HeldBehindAnother, GoesWhenTheOtherCannotBeSent) {
   bool held = false;
-  // Where this thread is so late that the other one gave up before, there is nothing to be held:
-  // once more.
+  // If this thread is so late that the other one gave up before, nothing is held, and it tries once
+  // more.
   for (Timeout patience{100}; !held; patience *= 2) {
     std::atomic<bool> over = false;
     std::thread sending([&] {

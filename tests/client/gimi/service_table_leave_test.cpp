@@ -11,7 +11,7 @@
 #include "tests/client/gimi/support/made_message.hpp"
 #include "tests/client/nif/support/fake_hub.hpp"
 
-// What is left of a subscription whose last handle was dropped.
+// Tests the rest of a subscription whose last handle was dropped.
 
 namespace gimnet::gimi {
 namespace {

@@ -74,7 +74,7 @@ class MovedServices : public Conversation, public testing::WithParamInterface<co
     settle_down();
   }
 
-  /// What the hub said before was seen to by the node.
+  /// Returns when the node has handled everything that the hub said before.
   void settle_down() {
     answer({++sequence_, MessageOperation::data, 0, 0}, {});
     EXPECT_EQ(node_->receive(kKey, kForever)->sequence(), sequence_);

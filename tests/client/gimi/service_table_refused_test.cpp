@@ -10,7 +10,7 @@
 #include "proto/control/ns.hpp"
 #include "tests/client/nif/support/fake_hub.hpp"
 
-// What a program asks for by the name of a subscription that the hub did not take again after a
+// Tests calls of a program by the name of a subscription that the hub did not take again after a
 // break.
 
 namespace gimnet::gimi {

@@ -272,7 +272,7 @@ TEST_F(Services, ASenderFollowsAServiceThatGoesAndComesBack) {
     drive->settle(kWait).or_throw();
     EXPECT_EQ(commands.receive(kWait)->text(), std::to_string(life));
     EXPECT_EQ(drive->counts().acknowledged, life);
-    // What waits for its answer when the service goes is lost, not waited for.
+    // A message that waits for its answer when the service goes is lost, not waited for.
   }
   EXPECT_TRUE(eventually([&] { return drive->send("?", kWait).is(Status::not_found); }));
   EXPECT_NE(drive->send("?").failure().sentence.find("robot/drive"), std::string::npos);

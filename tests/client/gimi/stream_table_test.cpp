@@ -79,7 +79,7 @@ class StreamTableTest : public Conversation {
     hub_.send_control(proto::Kind::ns, proto::encode(moved));
   }
 
-  /// What the hub said before was seen to by the node: so was what it says behind it.
+  /// Returns when the node has handled everything that the hub said before.
   void settle_down() {
     answer({++sequence_, MessageOperation::data, 0, 0}, {});
     EXPECT_EQ(node_->receive(kKey, kForever)->sequence(), sequence_);

@@ -134,7 +134,7 @@ namespace {
 
 namespace ns = proto::ns;
 
-/// What a watch acknowledges, as it is seen on the wire.
+/// Tests the acknowledgements of a watch, as they are seen on the wire.
 class WatchTaken : public test::Conversation {
  protected:
   void SetUp() override {

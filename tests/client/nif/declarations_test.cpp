@@ -149,7 +149,7 @@ Connected with_broken_subscription(FakeHub& hub) {
   return connected;
 }
 
-/// What the hub sent before was taken.
+/// Returns when the node has taken everything that the hub sent before.
 void settle(Connected& connected) {
   connected.hub.send_unicast(kPeerId, kOwnId, "settled");
   nif_incoming in{};

@@ -140,7 +140,7 @@ TEST(Handles, EveryCallOfAChildIsRefused) {
   EXPECT_EQ(status, 0);
 }
 
-/// What a callback saw when it called everything.
+/// The results that a callback saw when it called everything.
 struct Reentrant {
   nif_node* node = nullptr;
   std::atomic<bool> ready{false};

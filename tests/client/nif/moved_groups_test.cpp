@@ -5,7 +5,8 @@
 
 #include "tests/client/nif/support/declaring.hpp"
 
-// What a program publishes over a break after which its service has another group, or none.
+// Tests messages that a program publishes over a break after which its service has another group,
+// or none.
 
 namespace gimnet::nif::test {
 namespace {

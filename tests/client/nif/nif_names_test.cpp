@@ -131,7 +131,7 @@ TEST(NifNames, ChecksNamesBeforeItAsks) {
   EXPECT_EQ(nif_list_nodes(node, "a//b", &list, 0), NIF_BAD_NAME);
 }
 
-/// What a program of a later version gives.
+/// A struct as a program of a later version gives it.
 template <class Known>
 struct Newer {
   Known known;

@@ -11,8 +11,8 @@
 #include "tests/client/nif/support/fake_hub.hpp"
 #include "tests/client/nif/support/recording_host.hpp"
 
-// What the library's thread does by itself: keep-alive, silence, a full receive queue, a hub that
-// misbehaves.
+// Tests the work of the library's thread by itself: keep-alive, silence, a full receive queue, a
+// hub that misbehaves.
 
 namespace gimnet::nif::test {
 namespace {
@@ -148,7 +148,7 @@ TEST(NodeThread, ConfirmationOfWhatWasNeverSentEndsTheConnection) {
   EXPECT_TRUE(connected.hub.wait_closed());
 }
 
-/// What the answers of one read lead to stands between the messages of that read.
+/// The events of the answers of one read stand between the messages of that read.
 TEST(NodeThread, TellsEventsAndMessagesInTheOrderInWhichTheyCame) {
   FakeHub hub;
   Connected connected = connect_to(hub, default_options("robot"), make_welcome());

@@ -18,7 +18,7 @@
 
 namespace {
 
-/// How many allocations of this thread still succeed; -1: all.
+/// The number of allocations of this thread that still succeed; -1: all.
 thread_local constinit std::int64_t t_left = -1;
 thread_local constinit bool t_refused = false;
 
@@ -76,7 +76,7 @@ class OutOfMemory : public testing::TestWithParam<Sort> {
     }
   }
 
-  /// What the library's thread does then. True: the connection ended.
+  /// Does what the library's thread does then. True: the connection ended.
   bool reconnect_if_broken() {
     if (!line_->outbound.wants().no_memory) return false;
     line_->outbound.detach(true);

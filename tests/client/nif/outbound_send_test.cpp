@@ -12,7 +12,7 @@
 #include "proto/frame/report.hpp"
 #include "tests/client/nif/support/fake_hub.hpp"
 
-// What a sender sees: order, pauses, fragments and windows, time limits.
+// Tests the view of a sender: order, pauses, fragments and windows, time limits.
 
 namespace gimnet::nif::test {
 namespace {
@@ -213,7 +213,7 @@ TEST(OutboundSend, AsksAfterAReceiverThatIsSilentAndBelievesTheReport) {
       << "nobody asked for this report";
 }
 
-/// What the hub says of that frame, or of the same piece of another message.
+/// Has the hub report that frame, or the same piece of another message.
 void report(FakeConnection& hub, proto::DropReason reason, const Frame& frame,
             std::uint32_t number_offset = 0) {
   std::vector<std::byte> following(frame.bytes.begin() + proto::kHeaderSize, frame.bytes.end());

@@ -16,8 +16,8 @@
 #include "net/socket_stream.hpp"
 #include "tests/client/nif/support/fake_hub.hpp"
 
-// What sending costs in system calls, as the kernel counts them: one for a small message by itself,
-// one for many that had to wait. None of this depends on how fast anything is.
+// The price of sending in system calls, as the kernel counts them: one for a small message by
+// itself, one for many that had to wait. None of this depends on how fast anything is.
 
 namespace gimnet::nif::test {
 namespace {

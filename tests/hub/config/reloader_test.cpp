@@ -52,7 +52,7 @@ TEST_F(ReloaderTest, ChangesWhatMayChangeAndNamesWhatNeedsARestart) {
   EXPECT_EQ(changed.limits.nodes, 20u);
   EXPECT_EQ(changed.limits.frame_bytes, 65'536u);
   EXPECT_EQ(changed.log_level, LogLevel::debug);
-  // What needs a restart goes on to be named; what changed is in force.
+  // Settings that need a restart go on to be named; those that changed are in force.
   changed = reloader.read_again();
   EXPECT_THAT(changed.changes, SizeIs(2));
   EXPECT_EQ(changed.limits.nodes, 20u);

@@ -1,5 +1,6 @@
-// What a provider sent before it ended its service reaches the subscribers on every shard, however
-// late one of them is: the conductor and two shards, in any order of their turns that a seed says.
+// Messages that a provider sent before it ended its service reach the subscribers on every shard,
+// however late one of them is: the conductor and two shards, in any order of their turns that a
+// seed says.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -7,9 +7,9 @@
 #include "proto/control/ns.hpp"
 #include "tests/hub/control/support/test_conductor.hpp"
 
-// What a node is told at its return of services that moved while it was away, or whose event was
-// lost with its connection: with the command that lets WELCOME out, so that it stands before all
-// that waits for the node.
+// Tests the words to a node at its return about services that moved while it was away, or whose
+// event was lost with its connection: with the command that lets WELCOME out, so that it stands
+// before all that waits for the node.
 
 namespace gimnet::hub {
 namespace {

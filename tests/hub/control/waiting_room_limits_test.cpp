@@ -1,4 +1,5 @@
-// Who has to go when a waiting room is full, or there are no descriptors.
+// Tests the choice of the stranger that has to go when a waiting room is full, or when there are no
+// descriptors.
 
 #include "hub/control/waiting_room.hpp"
 

@@ -8,7 +8,7 @@
 
 namespace gimnet::test {
 
-/// How long a test waits for what must happen.
+/// A test waits for so long for an event that must come.
 inline constexpr std::chrono::seconds kPatience{20};
 
 /// A tcphub of its own on a free port of loopback, and wherever else `arguments` say. Ends with

@@ -139,7 +139,7 @@ inline std::uint32_t wait_for_move(nif_node* node) {
   return 0;
 }
 
-/// What comes next is not about services.
+/// The next frame is not about services.
 inline void expect_nothing_declared(Connected& connected) {
   EXPECT_EQ(nif_send_to(connected.node.get(), kPeerId, "x", 1), NIF_OK);
   const auto frame = connected.hub.next_message();

@@ -53,7 +53,7 @@ struct Line {
   /// The library's thread was asked to write.
   [[nodiscard]] bool woken() const { return net::wait_for(nullptr, {}, wake, 0).woken; }
 
-  /// What was written by now.
+  /// Returns the bytes that were written by now.
   [[nodiscard]] std::vector<std::byte> read() {
     std::vector<std::byte> all;
     std::array<std::byte, 4096> some;

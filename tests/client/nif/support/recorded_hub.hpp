@@ -55,7 +55,7 @@ class RecordedHub {
     }
     static_cast<void>(connection.wait_closed());
   }
-  /// Who it is, and the name, the token and the counts with which it comes back.
+  /// Checks the HELLO: the node, and the name, the token and the counts with which it comes back.
   static void hear_hello(FakeConnection& connection, const Step& step) {
     const auto heard = connection.read_hello();
     ASSERT_TRUE(heard);

@@ -36,7 +36,7 @@ class RecordedNode {
       if (::testing::Test::HasFatalFailure()) return;
     }
   }
-  /// What the recording had for it.
+  /// Counts of what the recording had for it.
   [[nodiscard]] std::size_t messages() const { return messages_; }
   [[nodiscard]] std::size_t events() const { return events_; }
   [[nodiscard]] std::size_t answers() const { return answers_; }
@@ -77,7 +77,7 @@ class RecordedNode {
     }
   }
 
-  // What it asks
+  // Its requests
 
   static const Step& answer_to(const Step& question, const Connection& steps) {
     for (const Step& step : steps) {
@@ -158,7 +158,7 @@ class RecordedNode {
     nif_free_reply(reply);
   }
 
-  // What it sends
+  // Its messages
 
   void send(const Step& step) {
     const proto::FrameView view = step.view();
@@ -186,7 +186,7 @@ class RecordedNode {
     EXPECT_EQ(nif_send(node_, &out, kPatienceMs), NIF_OK);
   }
 
-  // What it is told
+  // Words to it
 
   void be_told(const Step& step) {
     switch (step.header().kind) {
@@ -254,7 +254,7 @@ class RecordedNode {
       send_again_to(resume->target);
     }
   }
-  /// What had to wait goes now.
+  /// Sends what had to wait.
   void send_again_to(const proto::flow::Target& target) {
     const std::string text = "it goes on";
     const nif_bytes part{text.data(), text.size()};

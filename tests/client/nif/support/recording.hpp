@@ -71,7 +71,7 @@ struct Step {
   return step.is(proto::Kind::link) && step.operation() == proto::Goodbye::kOperation;
 }
 
-/// What was said on one connection, without openings: from the HELLO on.
+/// The steps of one connection, without openings: from the HELLO on.
 using Connection = std::vector<Step>;
 
 inline std::filesystem::path recordings_folder() {
@@ -103,7 +103,7 @@ void read_recording(const std::string& name, Take take) {
   }
 }
 
-/// Whoever speaks in a recording.
+/// The names of those that speak in a recording.
 inline std::set<std::string> who_speaks_in(const std::string& name) {
   std::set<std::string> names;
   read_recording(name, [&names](const std::string& who, const Step&) { names.insert(who); });
@@ -119,8 +119,7 @@ inline void lose_what_was_not_taken(Connection& broken, const proto::Hello& next
   });
 }
 
-/// What was said on one connection after the other of a node. `who`: the node's names in the
-/// recording.
+/// The connections of a node, one after the other. `who`: the node's names in the recording.
 inline std::vector<Connection> connections_of(const std::string& name,
                                               const std::vector<std::string>& who) {
   std::vector<Connection> connections;

@@ -5,7 +5,7 @@
 #include "proto/control/ctrl.hpp"
 #include "tests/hub/control/support/test_conductor.hpp"
 
-// What administrators are told where the hub cannot write its state.
+// Tests the answers to administrators if the hub cannot write its state.
 
 namespace gimnet::hub {
 namespace {

@@ -49,7 +49,7 @@ TEST(IndexPool, SkipsWhatIsHeldAfterComingRound) {
   EXPECT_EQ(pool.take(0ms), 1u);
 }
 
-/// What a hub that can keep it does.
+/// Takes a grant as a hub that can write its state does.
 IndexPool::Grant keep(IndexPool& pool, std::chrono::milliseconds now = 0ms) {
   const IndexPool::Grant grant = pool.next_grant(now);
   pool.grant(grant);

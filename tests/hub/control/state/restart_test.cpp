@@ -6,7 +6,7 @@
 
 #include "hub/control/state/membership.hpp"
 
-// What the state machines promise to nodes that come back to a hub which was killed.
+// Tests the promises of the state machines to nodes that come back to a hub which was killed.
 
 namespace gimnet::hub {
 namespace {

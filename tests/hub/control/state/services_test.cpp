@@ -221,7 +221,7 @@ TEST_F(ServicesTest, ASubscriberOfAStreamIsPacedOnlyIfItWantsAWindowOrARate) {
   EXPECT_FALSE(services_.unsubscribe(kViewer, "robot/odom", now_, effects_));
   EXPECT_THAT(take_words(),
               ElementsAre("member 2 of 1", "no pace 2 of 1", "subscribers robot/odom"));
-  // Who begins again begins as anybody else.
+  // A subscriber that begins again begins as any other.
   EXPECT_EQ(subscribe(kViewer, "robot/odom"), Status::done);
   EXPECT_THAT(take_words(), ElementsAre("member 2 of 1", "subscribers robot/odom"));
   EXPECT_FALSE(services_.find_group(GroupIndex{1})->pace_of(kViewer));

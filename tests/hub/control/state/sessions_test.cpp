@@ -91,7 +91,7 @@ TEST_F(SessionsTest, AForgedTokenClaimsNothing) {
   EXPECT_EQ(claim(longer), nullptr);
 }
 
-// Whoever cannot prove a token learns nothing by showing it: not whether it has expired, nor
+// A node that cannot prove a token learns nothing by showing it: not whether it has expired, nor
 // whether its session lives.
 TEST_F(SessionsTest, WhateverIsWrongWithATokenTheAnswerIsTheSame) {
   Session& live = create();

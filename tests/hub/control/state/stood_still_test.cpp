@@ -4,7 +4,8 @@
 
 #include "hub/control/state/membership.hpp"
 
-// What runs out while the hub itself stands still: stopped, starved, or with its disk.
+// Tests the times that run out while the hub itself stands still: stopped, starved, or with its
+// disk.
 
 namespace gimnet::hub {
 namespace {

@@ -99,7 +99,7 @@ TEST_F(WatchesTest, FollowEachOtherWithoutAGap) {
   EXPECT_EQ(version, watches.journal().version());
 }
 
-/// What the changes say is there, whatever came between the pages of the snapshot.
+/// The changes tell what is there, whatever came between the pages of the snapshot.
 TEST_F(WatchesTest, AreTrueThoughTheWorldChangesBetweenThePages) {
   Session& viewer = join("viewer");
   limits.scan_records = 64;
@@ -162,7 +162,7 @@ TEST_F(WatchesTest, ASlowWatcherIsSentLittleAndCostsNobodyElse) {
     EXPECT_EQ(take(fast), Texts{"joined robot-" + std::to_string(i)});
   }
   EXPECT_EQ(waiting[slow.index].size(), 4u);
-  // What was kept for it comes when it takes.
+  // The events that were kept for it come when it takes.
   const Texts late = take(slow);
   EXPECT_EQ(late.back(), "joined robot-999");
   EXPECT_EQ(watches.resyncs(), 0u);

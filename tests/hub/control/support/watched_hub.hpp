@@ -63,7 +63,7 @@ class WatchedHub {
     })) {
     }
   }
-  /// What a node was told and has not taken yet, as "kind name"; it takes all of it.
+  /// Takes all that a node was told and has not taken yet, as "kind name".
   std::vector<std::string> take(const Session& session) {
     std::vector<std::string> told;
     for (serve(); !waiting[session.index].empty(); serve()) {
