@@ -3,7 +3,7 @@
 #include "fuzz/support/fuzz_input.hpp"
 #include "proto/control/control_message.hpp"
 
-// What holds for every control message: once read, it comes out the same after writing it.
+// Checks a rule of every control message: once read, it comes out the same after writing it.
 
 namespace gimnet::fuzz {
 

@@ -9,8 +9,8 @@
 #include <memory>
 #include <span>
 
-// What all fuzz targets share: checks that end in an abort, and input bytes in memory of exactly
-// their size, so that AddressSanitizer sees a read of one byte too many.
+// The parts that all fuzz targets share: checks that end in an abort, and input bytes in memory of
+// exactly their size, so that AddressSanitizer sees a read of one byte too many.
 
 #define FUZZ_MUST(condition)                                                              \
   do {                                                                                    \

@@ -1,5 +1,5 @@
-// What strangers can make the hub look at, in any amount: instructions for each piece of it,
-// counted as those of scripts.cpp, must not grow with the amount. tests/perf/growth_test.py
+// Tests things that strangers can make the hub look at, in any amount: instructions for each of
+// them, counted as those of scripts.cpp, must not grow with the amount. tests/perf/growth_test.py
 // compares amounts.
 //
 //     growth_scripts SCRIPT:COUNT   runs it: once to warm up, then once counted; prints COUNT
@@ -32,7 +32,7 @@
 #include "tests/perf/growth.hpp"
 
 extern "C" {
-/// Where callgrind switches its counting on and off: never inlined, known by this name.
+/// Callgrind counts inside this function, which it finds by its name: it is never inlined.
 [[gnu::noinline]] void counted(const std::function<void()>& work) {
   work();
   asm volatile(
@@ -117,7 +117,7 @@ Work names(std::size_t count) {
   };
 }
 
-/// What answers of a hub name to a program that remembers it.
+/// Names in answers of a hub, for a program that remembers them.
 Work remembered_names(std::size_t count) {
   auto all = std::make_shared<std::vector<std::string>>(colliding_names(count));
   return [all] {

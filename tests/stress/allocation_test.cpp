@@ -51,7 +51,7 @@ class Traffic {
     ASSERT_NE(proto::write_frame(parts, payload, std::span(block).subspan(before)), 0u);
     ++frames_;
   }
-  /// What add() was told is sent so often in a round.
+  /// The messages of add() are sent so often in a round.
   void repeat(std::size_t times) { times_ = times; }
   /// Receivers read only when nobody can write any more: queues fill.
   void let_receivers_wait() { is_lazy_ = true; }

@@ -53,8 +53,8 @@ class Crowd {
     }
   }
 
-  /// What the hub has with a thousand connected and a little of the same traffic, which the kernels
-  /// still take.
+  /// Measures the memory of the hub with a thousand connected and a little of the same traffic,
+  /// which the kernels still take.
   void measure_base() { base_ = hub_.resident_bytes(); }
 
   /// Publishes so many messages of that size, as fast as the healthy subscriber takes them.

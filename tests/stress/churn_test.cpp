@@ -35,8 +35,8 @@ struct Address {
   std::uint32_t service = 0;  ///< the group of what it provides, which takes data
 };
 
-/// What every frame says about whom it is for: these nodes (LIST), this one (UNICAST), the provider
-/// of this service (SERVICE), or the subscribers of one sender (GROUP, whose group it is).
+/// The recipients of a frame, as every frame tells them: these nodes (LIST), this one (UNICAST),
+/// the provider of this service (SERVICE), or the subscribers of the sender that owns it (GROUP).
 struct Letter {
   proto::Kind kind = proto::Kind::unicast;
   std::uint32_t group = 0;
@@ -98,7 +98,7 @@ class Churn {
   [[nodiscard]] std::uint64_t received(proto::Kind kind) const {
     return received_by_kind_[static_cast<std::size_t>(kind)];
   }
-  /// What lists add to the ledger: a frame to n nodes has n outcomes, and was accepted once.
+  /// The excess of lists in the ledger: a frame to n nodes has n outcomes, and was accepted once.
   [[nodiscard]] std::uint64_t list_copies() const { return list_copies_; }
   [[nodiscard]] std::uint64_t joins() const { return joins_; }
 
@@ -339,7 +339,7 @@ TEST(Churn, DeliversToNobodyElseWhereNodesAreKilled) {
   EXPECT_EQ(churn.strays(), 0u);
   EXPECT_EQ(end["accepted"], churn.sent());
   expect_every_kind(churn, end);
-  // What the kernel had taken for a killed node is lost with it.
+  // Frames that the kernel had taken for a killed node are lost with it.
   EXPECT_GE(end["delivered"], churn.received());
   EXPECT_EQ(end.dropped(), churn.reported());
   EXPECT_TRUE(end.is_balanced()) << end.text();

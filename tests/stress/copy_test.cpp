@@ -83,7 +83,7 @@ void expect_no_payload_byte_copied(const char* shards) {
   EXPECT_EQ(after["copies"], audience.sent() * (kSubscribers - 1));
   EXPECT_EQ(after["delivered"], audience.received());
   EXPECT_EQ(after["copied_bytes"], before["copied_bytes"]);
-  // Where a read ended within a header, that was moved; never a byte behind it.
+  // If a read ended within a header, that was moved; never a byte behind it.
   EXPECT_LE(after["moved_tail_bytes"] - before["moved_tail_bytes"],
             proto::kHeaderSize * (after["receive_calls"] - before["receive_calls"]));
 }

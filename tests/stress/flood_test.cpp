@@ -33,8 +33,8 @@ nif_options at_shard(std::uint8_t shard) {
 
 std::vector<std::string> two_shards() { return {"--shards", "2", "--placement", "hint"}; }
 
-/// How a program sends and receives: in turns, everything that is there before the next message; or
-/// with a thread that sends and waits in nif_send() beside one that receives.
+/// The threads of a program that sends and receives: one takes turns, and receives everything that
+/// is there before the next message; of two, one sends and waits in nif_send(), and one receives.
 enum class Threads { one, two };
 
 struct Flooder {

@@ -26,7 +26,7 @@ void put_list(RawNode& node, std::uint16_t number) {
   node.put(parts_of(proto::Kind::ns, 0), proto::encode(proto::ns::List{}, number));
 }
 
-/// What the hub said before it ended the connection. What it answered before that is not looked at.
+/// The last word of the hub before it ended the connection. Its answers before that are skipped.
 proto::GoodbyeCode goodbye_of(RawNode& node) {
   const Deadline deadline;
   while (!node.is_closed()) {

@@ -30,7 +30,7 @@ std::size_t stranger_count() {
 }
 
 void write(const Descriptor& socket, std::span<const std::byte> bytes) {
-  // What a closed connection does not take any more is as good as written.
+  // Bytes that a closed connection does not take any more are as good as written.
   static_cast<void>(::send(socket.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL));
 }
 
@@ -178,7 +178,7 @@ TEST(BegunFrames, AreBoundedTogetherAndEndInTime) {
       }
     }
   }
-  // What the readers use for themselves comes on top of what is kept.
+  // Memory that the readers use for themselves comes on top of what is kept.
   EXPECT_LE(highest - before, kPartial + 12 * kMiB);
   const Statistics end = Statistics::of(observer);
   EXPECT_GT(end["stalled_frames"], 0u) << end.text();
@@ -219,7 +219,7 @@ TEST(Fragments, ThatNeverEndAreBoundedByTheBudget) {
     liar.flush_all();
     highest = std::max(highest, hub.resident_bytes());
   }
-  // What two shards keep for reading into, and what one long queue outgrew, come on top.
+  // Buffers that two shards keep for reading, and memory that one long queue outgrew, come on top.
   EXPECT_LE(highest - before, kBudget + kBudget / 10 + 24 * kMiB);
   expect_good_nodes_are_served(hub);
   const Statistics now = wait_for(

@@ -53,7 +53,7 @@ constexpr std::size_t kNodes = 100;
 /// Then the journal of changes is full, and the indices have come round: nothing has a reason to
 /// grow any more.
 constexpr std::uint64_t kWarmUp = 60'000;
-/// What each index that was ever given out takes for good: the number of its last session
+/// Each index that was ever given out takes these bytes for good: the number of its last session
 /// (NumberFloor), 8 MiB of all.
 constexpr std::int64_t kBytesOfAnIndex = 8;
 /// Two pages of these, and rounding of what grows by doubling. A leak of one byte a reconnect is
@@ -109,7 +109,7 @@ class LongRun : public ::testing::Test {
     ASSERT_TRUE(hub_.ask<proto::ns::WatchAnswer>(member.node, watch));
   }
 
-  /// What the shards and those who watch do at once.
+  /// Does the work that the shards and the watching nodes do at once.
   void settle() {
     for (bool again = true; again;) {
       again = hub_.conductor.tell_rest(hub_.now);

@@ -24,7 +24,7 @@ namespace gimnet::stress {
 namespace {
 
 constexpr std::int64_t kMiB = 1 << 20;
-/// What the hub keeps of retained messages beside its budget (retained_budget_bytes).
+/// The bytes of retained messages that the hub keeps beside its budget (retained_budget_bytes).
 constexpr std::int64_t kRetainedBudget = 64 * kMiB;
 
 struct Size {
@@ -39,7 +39,7 @@ Size size_of_the_run() {
 }
 
 std::vector<std::string> arguments(std::int64_t budget) {
-  // What the kernel takes for a node is little, so that a healthy one has data waiting at the hub.
+  // The kernel takes little for a node, so that a healthy one has data waiting at the hub.
   return {"--shards", "2",
           "--limit",  "silent_ms=600000",
           "--limit",  "slow_consumer_ms=600000",

@@ -21,7 +21,7 @@ namespace {
 /// As many strangers at a time as a hub hears of at once.
 constexpr std::size_t kAtOnce = 256;
 
-/// What a node knows of itself, and its connection.
+/// A node as it knows itself, and its connection.
 struct Member {
   std::string name;
   NodeId id;

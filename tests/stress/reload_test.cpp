@@ -249,7 +249,7 @@ bool is_running(const std::future<void>& thread) {
 TEST(Reload, NothingEndsAndNothingForbiddenSucceedsWhileItIsReadAgainAndAgain) {
   const std::size_t count = is_full_size() ? 10'000 : 300;
   const ConfigFile file;
-  // Who tries what is forbidden as often as he can is not to be sent away for that.
+  // A node that tries what is forbidden as often as it can must not be sent away for that.
   HubProcess hub({"--shards", "2", "--placement", "hint", "--config", file.path(), "--limit",
                   "sync_window=4", "--limit", "oddities_per_s=1000000", "--limit",
                   "oddities_burst=1000000", "--limit", "declarations_per_s=1000000", "--limit",

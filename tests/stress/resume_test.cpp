@@ -166,7 +166,7 @@ TEST(Resume, TheAnnouncedGapIsTheLossWhereTheBufferIsSmall) {
   Received received;
   Incoming in;
   for (int round = 0; round < 5; ++round) {
-    // What is written while nothing comes through is unconfirmed: far more than the buffer keeps.
+    // Frames written while nothing comes through are unconfirmed: far more than the buffer keeps.
     proxy.hold_downstream(true);
     for (int i = 0; i < 400; ++i) {
       std::memcpy(payload, &++number, sizeof number);

@@ -32,8 +32,8 @@ std::vector<std::uint64_t> pattern(std::size_t bytes) {
   return words;
 }
 
-/// What the receiver's library says to the sender's goes in lane 0: when this has come, so has
-/// that, and the sender may go without frames to it being dropped.
+/// The receiver's library speaks to the sender's in lane 0: when this word has come, so have those,
+/// and the sender may go without frames to it being dropped.
 void expect_last_word(const NifNode& from, const NifNode& to) {
   nif_outgoing word = NIF_OUTGOING_INIT;
   word.to = to.id();

@@ -36,7 +36,7 @@ class ByteQueue {
   std::size_t begin_ = 0;
 };
 
-/// What each of the next calls may move.
+/// The bytes that each of the next calls may move.
 class Plan {
  public:
   void set(std::vector<std::size_t> sizes) {

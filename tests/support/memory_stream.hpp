@@ -25,7 +25,7 @@ class MemoryStream final : public net::Stream {
   [[nodiscard]] net::IoResult receive(std::span<std::byte> into) override;
   [[nodiscard]] net::IoResult send(std::span<const iovec> pieces) override;
   void shut_down() override;
-  /// What the peer has not read yet.
+  /// The bytes that the peer has not read yet.
   [[nodiscard]] std::uint64_t unsent_bytes() const override;
   void limit_unsent(std::uint32_t bytes) override;
   void limit_unacknowledged(std::uint32_t ms) override;

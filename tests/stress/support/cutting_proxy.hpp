@@ -15,7 +15,7 @@
 
 namespace gimnet::stress {
 
-/// What the proxy does to the connection that goes through it.
+/// The deeds of the proxy to the connection that goes through it.
 struct CutPlan {
   std::size_t cuts = 0;             ///< so many, then it only forwards
   std::uint64_t bytes_between = 0;  ///< of both directions together, on average

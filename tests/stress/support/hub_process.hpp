@@ -44,7 +44,7 @@ class HubProcess {
   Descriptor output_;
 };
 
-/// What the program prints on standard output when it is run with these arguments.
+/// Runs the program with these arguments and returns its standard output.
 [[nodiscard]] std::string output_of_tcphub(const std::vector<std::string>& arguments);
 
 }  // namespace gimnet::stress

@@ -37,7 +37,7 @@ class NifNode {
   nif_node* node_ = nullptr;
 };
 
-/// What was received, until it goes.
+/// The latest received item. Ownership: its memory, until the next one or its own end.
 class Incoming {
  public:
   Incoming() = default;

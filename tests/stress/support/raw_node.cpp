@@ -152,7 +152,7 @@ bool RawNode::flush() {
     const ssize_t size =
         ::send(socket_.get(), out_.data() + written_, out_.size() - written_, MSG_NOSIGNAL);
     if (size < 0 && errno != EINTR && errno != EAGAIN) {
-      // What the hub said before it closed can still be read; nothing more can be written.
+      // The words of the hub before it closed can still be read; nothing more can be written.
       written_ = out_.size();
       break;
     }

@@ -19,7 +19,7 @@
 
 namespace gimnet::stress {
 
-/// What one call reads at most.
+/// One call reads so much at most.
 inline constexpr std::size_t kReadBytesMax = 256 * 1024;
 
 /// One frame as the hub sent it. Valid until: the next read_some().
@@ -31,7 +31,7 @@ struct Frame {
   }
 };
 
-/// How to join; the rest of HELLO as in `hello`.
+/// The terms of joining; the rest of HELLO as in `hello`.
 struct JoinOptions {
   proto::Hello hello;
   SocketOptions socket;
@@ -56,7 +56,7 @@ class RawNode {
   [[nodiscard]] int descriptor() const { return socket_.get(); }
   /// The hub ended the connection.
   [[nodiscard]] bool is_closed() const { return is_closed_; }
-  /// What the hub said before it did.
+  /// The last word of the hub before it did.
   [[nodiscard]] const std::optional<proto::Goodbye>& goodbye() const { return goodbye_; }
 
   /// One recv(). True: something came.

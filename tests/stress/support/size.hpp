@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-// How much a run does, and how long it waits before it calls a thing broken.
+// The amount of work of a run, and the time that it waits before it calls a thing broken.
 
 namespace gimnet::stress {
 

@@ -43,7 +43,7 @@ class Statistics {
   std::map<std::size_t, std::map<std::string, std::uint64_t>> by_shard_;
 };
 
-/// What the hub counted as soon as nothing moves: twice in a row the same ledger, which is exact.
+/// The counts of the hub as soon as nothing moves: twice in a row the same ledger, which is exact.
 /// Throws, with the last counters, when there is no such moment.
 [[nodiscard]] Statistics wait_for_exact_ledger(RawNode& observer);
 

@@ -12,7 +12,7 @@
 namespace gimnet::tool {
 namespace {
 
-/// What `gimnet WORDS --help` prints.
+/// The output of `gimnet WORDS --help`.
 std::string help(const std::vector<std::string>& words) {
   std::vector<const char*> arguments{"gimnet"};
   for (const std::string& word : words) arguments.push_back(word.c_str());

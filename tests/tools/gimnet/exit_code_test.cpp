@@ -6,7 +6,7 @@ namespace gimnet::tool {
 namespace {
 
 TEST(ExitCode, TermsOutOfRangeAreWrongArgumentsAndAFullTableIsNot) {
-  // What becomes of the status bad_request of a hub, and of limit.
+  // The bad_request of a hub reaches the program as bad_argument, a full table as limit.
   EXPECT_EQ(exit_code_of(Status::bad_argument), ExitCode::usage);
   EXPECT_EQ(exit_code_of(Status::limit), ExitCode::failed);
 }

@@ -22,7 +22,7 @@ class ConnectionWatchTest : public gimi::test::Conversation {
     while (node_->state().reconnects == before) std::this_thread::yield();
   }
 
-  /// What is said when a message comes that was received over that connection.
+  /// The words on standard error when a message comes that was received over that connection.
   std::string said_at_message_of(std::uint32_t connection) {
     const Message message = test::make_message("x", 1, {}, "", connection);
     testing::internal::CaptureStderr();
