@@ -89,6 +89,8 @@ class HubLink {
   /// keep-alives.
   [[nodiscard]] Alive is_alive(std::chrono::milliseconds now);
   [[nodiscard]] std::uint16_t cost() const { return cost_.value().value_or(LinkCost::kUnmeasured); }
+  /// As people are told: 0 while it was not measured.
+  [[nodiscard]] std::uint16_t known_cost() const { return cost_.value().value_or(0); }
   [[nodiscard]] const LinkClock& clock() const { return clock_; }
   /// LinkClock::ahead, if the shard has to be told of it: less than a millisecond changes nothing.
   [[nodiscard]] std::optional<std::chrono::nanoseconds> take_clock_change();

@@ -378,8 +378,8 @@ std::string Links::remove(std::string_view name) {
 
 std::string Links::set_cost(std::string_view name, std::uint16_t cost) {
   HubLink* const link = find(name);
-  if (link == nullptr || !link->is_dialled())
-    return "this hub dials no link '" + std::string{name} + "'; its cost is decided by the dialler";
+  if (link == nullptr) return "there is no link '" + std::string{name} + "'; see gimnet links";
+  if (!link->is_dialled()) return "the other side dials that link; set its cost there";
   link->fix_cost(cost);
   // The other end hears of it by the next HELLO.
   close(*link, GoodbyeCode::replaced, "the link has another cost");

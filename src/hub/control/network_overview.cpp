@@ -92,7 +92,7 @@ LinkView NetworkOverview::view_of(const HubLink& link) const {
   view.dialled = link.is_dialled();
   view.state = state_of(link);
   view.last_error = link.last_error;
-  view.cost = link.cost();
+  view.cost = link.known_cost();
   if (link.peer()) view.hub = link.peer()->hub.hub;
   const LinkClock& clock = link.clock();
   view.rtt_us = static_cast<std::uint32_t>(

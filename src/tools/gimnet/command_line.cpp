@@ -128,7 +128,11 @@ std::string all_actions() {
 }
 
 CommandEnding unknown_action(std::string_view word) {
-  const std::string nearest = did_you_mean(word, kCtlActions);
+  const bool is_command =
+      std::ranges::find(kCommands, word, &decltype(kCommands)::value_type::first) !=
+      kCommands.end();
+  const std::string nearest = is_command ? "; that is a command: gimnet " + std::string(word)
+                                         : did_you_mean(word, kCtlActions);
   return wrong("there is no action '" + std::string(word) + "' of gimnet ctl" +
                    (nearest.empty() ? ": give " + all_actions() : nearest),
                {"ctl", ""});

@@ -81,7 +81,7 @@ Examples:
 )";
 
 void add_link(CLI::App& link, CtlOptions& options) {
-  link.add_option("change", options.change, "add, remove or cost")
+  link.add_option("change", options.change, "add, remove or cost; gimnet links lists links")
       ->required()
       ->check(CLI::IsMember({"add", "remove", "cost"}).description(""));
   link.add_option("link", options.link, "the URL to add, or the name of a link")

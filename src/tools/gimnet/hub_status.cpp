@@ -174,22 +174,26 @@ std::string text_of(const HubStatus& status, Paint paint) {
 
 namespace {
 
-std::string json_of(const std::vector<NodeRecord>& nodes) {
+std::string json_of(const std::vector<NodeRecord>& nodes, ToolSession& session) {
   JsonWriter json;
   json.begin_array();
-  for (const NodeRecord& node : nodes) write(json, node);
+  for (const NodeRecord& node : nodes) write(json, node, session.standing_of(node));
   return json.end_array().str() + "\n";
 }
 
-std::string table_of(const std::vector<NodeRecord>& nodes, Paint paint) {
+std::string table_of(const std::vector<NodeRecord>& nodes, ToolSession& session) {
   Table table({"ID", "NAME", "HUB", "STATE", "SERVICES", "SINCE", "PLACE", "DESCRIPTION"});
+  const auto own_hub = hub_of(NodeId{session.node().peer().id}).value();
   for (const NodeRecord& node : nodes) {
+    // A hub knows no more than names and states of another hub's nodes.
+    const bool own = node.hub_id == own_hub;
     table.add({node.node.text(), node.name.empty() ? "-" : node.name, node.hub_name,
-               node.connected ? "connected" : "away", std::to_string(node.services),
-               std::to_string(node.joined_ms / 1000) + " s", node.place, node.description},
+               std::string(session.standing_of(node)), own ? std::to_string(node.services) : "-",
+               own ? std::to_string(node.joined_ms / 1000) + " s" : "-", own ? node.place : "-",
+               node.description},
               node.connected ? Tone::plain : Tone::warning);
   }
-  return table.text(paint);
+  return table.text(session.paint());
 }
 
 }  // namespace
@@ -203,7 +207,7 @@ ExitCode run_nodes(ToolSession& session) {
   if (!nodes) return session.fail(nodes.failure());
   if (id) std::erase_if(*nodes, [&](const NodeRecord& node) { return node.node.id != id->id; });
   if (!options.all) std::erase_if(*nodes, is_tool);
-  session.output().write(options.json ? json_of(*nodes) : table_of(*nodes, session.paint()));
+  session.output().write(options.json ? json_of(*nodes, session) : table_of(*nodes, session));
   if (nodes->empty() && !options.target.empty()) return session.fail_unmatched("node");
   return session.finish();
 }

@@ -125,11 +125,12 @@ std::string delivery_of(const ServiceRecord& service) {
   return service.delivery == Delivery::latest ? "latest" : "stream";
 }
 
-void write(JsonWriter& json, const NodeRecord& node) {
+void write(JsonWriter& json, const NodeRecord& node, std::optional<std::string_view> state) {
   json.begin_object().member("id", node.node.text()).member("name", node.name);
   json.member("hub", node.hub_name)
       .member("hub_id", node.hub_id)
       .member("connected", node.connected);
+  if (state) json.member("state", *state);
   json.member("description", node.description).member("place", node.place);
   json.member("joined_ms", node.joined_ms).member("services", node.services).end_object();
 }

@@ -57,7 +57,9 @@ class JsonWriter {
 };
 
 /// Writes a record as an object, everywhere with the same members.
-void write(JsonWriter& json, const NodeRecord& node);
+/// `state`: as ToolSession::standing_of(), where it is known.
+void write(JsonWriter& json, const NodeRecord& node,
+           std::optional<std::string_view> state = std::nullopt);
 /// `place`: that of its node, where it is known.
 void write(JsonWriter& json, const ServiceRecord& service,
            std::optional<std::string_view> place = std::nullopt);

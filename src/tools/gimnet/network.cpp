@@ -15,16 +15,14 @@ namespace {
 /// `null` in JSON.
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
-/// A number that 0 means "not known" of.
-void member_if_known(JsonWriter& json, std::string_view name, std::uint32_t value) {
-  if (value == 0) {
-    json.member(name, kUnknown);
-  } else {
-    json.member(name, value);
-  }
+JsonWriter& member_if(bool known, JsonWriter& json, std::string_view name, std::uint32_t value) {
+  return known ? json.member(name, value) : json.member(name, kUnknown);
 }
 
-std::string text_if_known(std::uint32_t value) { return value == 0 ? "-" : std::to_string(value); }
+std::string text_if(bool known, std::uint32_t value) { return known ? std::to_string(value) : "-"; }
+
+/// A way, or one that is too long to go.
+bool has_length(const NetworkHub& hub) { return hub.reachable || hub.too_far; }
 
 double microseconds(double ns) { return ns / 1000.0; }
 
@@ -49,8 +47,10 @@ std::string json_of(const std::vector<NetworkHub>& hubs) {
   json.begin_array();
   for (const NetworkHub& hub : hubs) {
     json.begin_object().member("id", hub.hub_id).member("name", hub.name);
-    json.member("version", hub.version).member("distance", hub.distance).member("cost", hub.cost);
-    member_if_known(json, "via", hub.next_hop);
+    json.member("version", hub.version);
+    member_if(has_length(hub), json, "distance", hub.distance);
+    member_if(has_length(hub), json, "cost", hub.cost);
+    member_if(hub.next_hop != 0, json, "via", hub.next_hop);
     json.member("nodes", hub.nodes).member("services", hub.services);
     json.member("reachable", hub.reachable).member("too_far", hub.too_far).end_object();
   }
@@ -64,9 +64,10 @@ std::string text_of(const std::vector<NetworkHub>& hubs, Paint paint) {
     table.add({std::to_string(hub.hub_id), hub.name,
                hub.too_far     ? "too far"
                : hub.reachable ? "reachable"
-                               : "away",
-               std::to_string(hub.distance), std::to_string(hub.cost), text_if_known(hub.next_hop),
-               std::to_string(hub.nodes), std::to_string(hub.services), hub.version},
+                               : kUnreachable,
+               text_if(has_length(hub), hub.distance), text_if(has_length(hub), hub.cost),
+               text_if(hub.next_hop != 0, hub.next_hop), std::to_string(hub.nodes),
+               std::to_string(hub.services), hub.version},
               right ? Tone::plain : Tone::warning);
   }
   return table.text(paint);
@@ -76,10 +77,10 @@ void write(JsonWriter& json, const std::vector<LinkRecord>& links) {
   json.begin_array();
   for (const LinkRecord& link : links) {
     json.begin_object().member("name", link.name);
-    member_if_known(json, "hub", link.hub_id);
+    member_if(link.hub_id != 0, json, "hub", link.hub_id);
     json.member("peer", link.peer).member("state", link.state).member("dialled", link.dialled);
-    member_if_known(json, "cost", link.cost);
-    member_if_known(json, "rtt_us", link.rtt_us);
+    member_if(link.cost != 0, json, "cost", link.cost);
+    member_if(link.rtt_us != 0, json, "rtt_us", link.rtt_us);
     const bool clock = link.clock_error_ns != 0;
     json.member("clock_offset_us",
                 clock ? microseconds(static_cast<double>(link.clock_offset_ns)) : kUnknown);
@@ -110,10 +111,10 @@ std::string text_of(const std::vector<LinkRecord>& links, Paint paint) {
                "LAST ERROR"});
   for (const LinkRecord& link : links) {
     const bool right = link.state == "up" || link.state == "standby";
-    table.add({link.name, text_if_known(link.hub_id), link.state, text_if_known(link.cost),
-               text_if_known(link.rtt_us), std::to_string(link.queued_bytes),
-               std::to_string(link.sent_bytes), std::to_string(link.received_bytes), link.peer,
-               link.last_error},
+    table.add({link.name, text_if(link.hub_id != 0, link.hub_id), link.state,
+               text_if(link.cost != 0, link.cost), text_if(link.rtt_us != 0, link.rtt_us),
+               std::to_string(link.queued_bytes), std::to_string(link.sent_bytes),
+               std::to_string(link.received_bytes), link.peer, link.last_error},
               right ? Tone::plain : Tone::warning);
   }
   return table.text(paint);
@@ -189,7 +190,7 @@ std::string graph_ascii(const std::vector<NetworkHub>& hubs) {
   const std::vector<GraphEdge> edges = edges_of(hubs);
   std::string text;
   for (const NetworkHub& hub : hubs) {
-    text += title_of(hub) + (hub.reachable ? "" : " (away)");
+    text += title_of(hub) + (hub.reachable ? "" : " (unreachable)");
     const char* between = " -- ";
     for (const GraphEdge& edge : edges) {
       if (edge.a != hub.hub_id && edge.b != hub.hub_id) continue;

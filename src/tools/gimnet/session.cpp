@@ -137,8 +137,23 @@ std::string ToolSession::words_for_no_node(std::string_view name) {
 void ToolSession::tell_if_away(std::string_view name) {
   const auto nodes = node_->nodes(name);
   if (!nodes || nodes->empty() || nodes->front().name != name || nodes->front().connected) return;
+  const NodeRecord& node = nodes->front();
+  const bool unreachable = standing_of(node) == std::string_view{kUnreachable};
   say("the node '" + std::string(name) +
-      "' is away: its connection broke; `gimnet watch` shows when it is back");
+      (unreachable ? "' is unreachable: there is no way to its hub " + node.hub_name +
+                         "; `gimnet hubs` shows when there is one"
+                   : "' is away: its connection broke; `gimnet watch` shows when it is back"));
+}
+
+std::string_view ToolSession::standing_of(const NodeRecord& node) {
+  if (node.connected) return "connected";
+  if (node.hub_id == hub_of(NodeId{node_->peer().id}).value()) return "away";
+  if (!hubs_) {
+    auto hubs = node_->hubs();
+    hubs_ = hubs ? std::move(*hubs) : std::vector<NetworkHub>{};
+  }
+  const auto hub = std::ranges::find(*hubs_, node.hub_id, &NetworkHub::hub_id);
+  return hub == hubs_->end() || hub->reachable ? "away" : kUnreachable;
 }
 
 bool ToolSession::is_listed(std::string_view name) {

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "gimnet/gimi.hpp"
 #include "tools/gimnet/bounds.hpp"
@@ -50,6 +51,9 @@ class ConnectionWatch {
   std::string told_;  ///< why it broke last
 };
 
+/// The state of hubs to which there is no way, and of their nodes.
+inline constexpr const char* kUnreachable = "unreachable";
+
 /// The description of this tool's nodes.
 inline constexpr const char* kToolDescription = "gimnet tool";
 
@@ -78,6 +82,10 @@ class ToolSession {
 
   /// A node by name or id. Nothing: the words are printed, code() says how to end.
   [[nodiscard]] std::optional<Peer> find(std::string_view name);
+
+  /// "connected", "away" (its own hub says that its connection broke), or "unreachable": there is
+  /// no way to its hub. Asks for the network's hubs, once, if one of another hub is not connected.
+  [[nodiscard]] std::string_view standing_of(const NodeRecord& node);
 
   /// Is there a service of that full name?
   [[nodiscard]] bool is_service(std::string_view name);
@@ -121,6 +129,7 @@ class ToolSession {
   StopSignal& stop_;
   Output output_;
   std::optional<Node> node_;
+  std::optional<std::vector<NetworkHub>> hubs_;  ///< once standing_of() had to ask
   ExitCode code_ = ExitCode::done;
 };
 

@@ -66,7 +66,8 @@ TEST(CtlOptions, WrongChangesOfLinksAreTold) {
   };
   EXPECT_THAT(fault({"ctl", "link", "remove", "lab", "--proxy", "http://p:1"}),
               HasSubstr("--proxy is for a link that is added: leave it out"));
-  EXPECT_THAT(fault({"ctl", "link"}), HasSubstr("change is missing: add, remove or cost"));
+  EXPECT_THAT(fault({"ctl", "link"}), HasSubstr("change is missing: add, remove or cost; gimnet"));
+  EXPECT_THAT(fault({"ctl", "links"}), HasSubstr("that is a command: gimnet links"));
   EXPECT_THAT(fault({"ctl", "link", "ad", "x"}),
               HasSubstr("'ad' is no value for change: add, remove or cost"));
   EXPECT_THAT(fault({"ctl", "link", "add"}), HasSubstr("link is missing: the URL to add"));

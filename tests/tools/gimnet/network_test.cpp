@@ -88,16 +88,17 @@ TEST(NetworkCommands, WrongWordsAreTold) {
 }
 
 TEST(NetworkText, OfHubs) {
-  EXPECT_EQ(json_of(some_hubs()),
-            "[{\"id\":1,\"name\":\"lab\",\"version\":\"0.1.0\",\"distance\":0,\"cost\":0,\"via\":1,"
-            "\"nodes\":3,\"services\":1,\"reachable\":true,\"too_far\":false},"
-            "{\"id\":2,\"name\":\"a\\\"b\",\"version\":\"\",\"distance\":1,\"cost\":12,\"via\":2,"
-            "\"nodes\":0,\"services\":0,\"reachable\":true,\"too_far\":false},"
-            "{\"id\":3,\"name\":\"gone\",\"version\":\"\",\"distance\":0,\"cost\":0,\"via\":null,"
-            "\"nodes\":0,\"services\":0,\"reachable\":false,\"too_far\":false}]\n");
+  EXPECT_EQ(
+      json_of(some_hubs()),
+      "[{\"id\":1,\"name\":\"lab\",\"version\":\"0.1.0\",\"distance\":0,\"cost\":0,\"via\":1,"
+      "\"nodes\":3,\"services\":1,\"reachable\":true,\"too_far\":false},"
+      "{\"id\":2,\"name\":\"a\\\"b\",\"version\":\"\",\"distance\":1,\"cost\":12,\"via\":2,"
+      "\"nodes\":0,\"services\":0,\"reachable\":true,\"too_far\":false},"
+      "{\"id\":3,\"name\":\"gone\",\"version\":\"\",\"distance\":null,\"cost\":null,\"via\":null,"
+      "\"nodes\":0,\"services\":0,\"reachable\":false,\"too_far\":false}]\n");
   const std::string table = text_of(some_hubs());
   EXPECT_THAT(table, HasSubstr("HUB  NAME  STATE"));
-  EXPECT_THAT(table, HasSubstr("away"));
+  EXPECT_THAT(table, HasSubstr("unreachable  -         -     -"));
 }
 
 TEST(NetworkText, OfLinks) {
@@ -138,7 +139,7 @@ TEST(NetworkGraph, JoinsBothEndsOfALinkAtTheHigherCost) {
 TEST(NetworkGraph, IsDrawnInThreeWays) {
   EXPECT_EQ(graph_ascii(some_hubs()),
             "1 lab -- 2 (12)\n2 a\"b -- 1 (12), 3 (10, one-sided)\n"
-            "3 gone (away) -- 2 (10, one-sided)\n");
+            "3 gone (unreachable) -- 2 (10, one-sided)\n");
   EXPECT_EQ(graph_dot(some_hubs()),
             "graph gimnet {\n  1 [label=\"1 lab\"];\n  2 [label=\"2 a\\\"b\"];\n"
             "  3 [label=\"3 gone\", style=dashed];\n  1 -- 2 [label=\"12\"];\n"
