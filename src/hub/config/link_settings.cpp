@@ -215,7 +215,7 @@ void complete_links(Configuration& configuration, Faults& faults) {
   const auto uses = [&](const DialledLink& link) { return link.proxy == configuration.proxy; };
   if (!configuration.proxy.empty() && std::ranges::any_of(options.links.dial, uses)) {
     if (const auto proxy = net::parse_proxy(configuration.proxy); !proxy)
-      faults.push_back({"", "GIMNET_PROXY: " + proxy.error().sentence});
+      faults.push_back({"", "--proxy or GIMNET_PROXY: " + proxy.error().sentence});
   }
   for (std::size_t i = 0; i < options.links.dial.size(); ++i) {
     const DialledLink& link = options.links.dial[i];

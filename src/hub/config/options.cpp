@@ -22,8 +22,8 @@ struct OptionText {
 };
 
 /// In the order of the help.
-const std::array<OptionText, 18>& option_texts() {
-  static const std::array<OptionText, 18> texts{
+const std::array<OptionText, 19>& option_texts() {
+  static const std::array<OptionText, 19> texts{
       {{"-h,--help", "", "Says this and ends"},
        {"--listen", "URL",
         "Address to listen on, may be repeated: tcp://127.0.0.1:7450, tcp://[::1]:0 (any free "
@@ -39,6 +39,7 @@ const std::array<OptionText, 18>& option_texts() {
        {"--state-dir", "DIR", "Folder for what the hub keeps, created if needed"},
        {"--link", "URL",
         "Hub to link to, may be repeated: tcp://HOST:PORT or unix:/PATH. It must accept links"},
+       {"--proxy", "URL", "HTTP proxy to dial links through: http://[USER:PASSWORD@]HOST:PORT"},
        {"--accept-links", "", "Takes links of other hubs, which may speak for nodes of theirs"},
        {"--limit", "NAME=VALUE", "Sets a limit, may be repeated; --help-limits lists them"},
        {"--help-limits", "", "Lists all limits and ends"},
@@ -192,6 +193,7 @@ std::string read_flags(const CLI::App& app, ConfigSources& sources) {
     }
     sources.flags.push_back(flag(key, "--limit", assignment.substr(equals + 1)));
   }
+  if (app.count("--proxy") != 0) sources.proxy = app.get_option("--proxy")->results().front();
   if (app.count("--config") != 0) sources.file = app.get_option("--config")->results().front();
   if (app.count("--config") != 0 && sources.file.empty())
     return "--config is empty: give it the path of a TOML file, or leave it out";

@@ -54,7 +54,7 @@ struct Configuration {
   /// One for each of options.listen, for what can only be judged when all is known.
   std::vector<ConfigFault> listen_places;
   std::vector<std::string> link_places;  ///< the same of options.links.dial
-  std::string proxy{};                   ///< GIMNET_PROXY, for links that name none
+  std::string proxy{};                   ///< --proxy or GIMNET_PROXY, for links that name none
   std::map<std::string, std::string, std::less<>> places;  ///< as `origins`, for faults
 };
 

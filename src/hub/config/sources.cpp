@@ -67,7 +67,7 @@ int read_whole(int descriptor, std::string& text) {
 }  // namespace
 
 ConfigText read_config_text(const std::string& path, bool pipes) {
-  struct stat info{};
+  struct stat info {};
   // Before it is opened: opening may already do something to a device, or wake the writer of a
   // pipe.
   if (::stat(path.c_str(), &info) != 0) return no_text(errno);
@@ -232,7 +232,8 @@ std::vector<std::string> read_environment(ConfigSources& sources, const char* co
   for (; *environment != nullptr; ++environment) {
     const std::string_view entry = *environment;
     const std::size_t equals = entry.find('=');
-    if (entry.starts_with(kProxyVariable)) sources.proxy = entry.substr(equals + 1);
+    if (entry.starts_with(kProxyVariable) && sources.proxy.empty())
+      sources.proxy = entry.substr(equals + 1);
     if (!entry.starts_with(kPrefix) || equals == std::string_view::npos) continue;
     const std::string variable{entry.substr(0, equals)};
     const std::string_view value = entry.substr(equals + 1);

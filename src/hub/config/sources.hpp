@@ -33,7 +33,7 @@ struct ConfigSources {
   std::vector<Given> flags;
   Faults faults{};           ///< of how the file is named
   bool parts_alone = false;  ///< `file` was not there, only the conf.d beside it
-  std::string proxy{};       ///< GIMNET_PROXY; "": none
+  std::string proxy{};       ///< --proxy or GIMNET_PROXY; "": none
 };
 
 /// The place where the files were found.
@@ -54,7 +54,7 @@ struct ReadConfiguration {
 [[nodiscard]] std::vector<std::string> default_config_files();
 
 /// The variables of this process that configure a hub; TCPHUB_CONFIG sets `sources.file` unless it
-/// is set, and GIMNET_PROXY sets `sources.proxy`. Warnings: variables that are no key.
+/// is set, and GIMNET_PROXY likewise `sources.proxy`. Warnings: variables that are no key.
 [[nodiscard]] std::vector<std::string> read_environment(ConfigSources& sources,
                                                         const char* const* environment);
 

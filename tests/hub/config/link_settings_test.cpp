@@ -192,6 +192,11 @@ TEST(LinkSettings, TheProxyOfTheEnvironmentIsForLinksThatNameNone) {
   EXPECT_EQ(all.dial[3].proxy, "http://q:1");
   EXPECT_EQ(flags({"--link", "tcp://127.0.0.1:1"}, {"GIMNET_PROXY=http://p:1"}).dial[0].proxy,
             "http://p:1");
+  EXPECT_EQ(
+      flags({"--link", "tcp://127.0.0.1:1", "--proxy", "http://q:1"}, {"GIMNET_PROXY=http://p:1"})
+          .dial[0]
+          .proxy,
+      "http://q:1");
   EXPECT_THAT(fault("[[link]]\nurl = 'tcp://127.0.0.1:1'", "socks5://ann:secret@p"),
               AllOf(HasSubstr("GIMNET_PROXY: cannot use the proxy"), Not(HasSubstr("secret"))));
   EXPECT_THAT(links("", "socks5://p").dial, IsEmpty()) << "nothing uses it";
