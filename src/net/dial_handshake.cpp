@@ -58,7 +58,8 @@ DialHandshake::State DialHandshake::take(std::span<const std::byte> bytes) {
   if (rest.size() < proto::kHeaderSize) return State::need_more;
   const proto::FrameHeader header = proto::load_header(rest.data());
   if (header.kind != proto::Kind::link || header.flags != 0) {
-    return fail(Fault::protocol, "the peer answered HELLO with something else than WELCOME");
+    return fail(Fault::protocol,
+                "the peer answered HELLO with something else than WELCOME; is it a hub?");
   }
   if (header.length > kAnswerBytesMax)
     return fail(Fault::protocol, "the peer's answer to HELLO is too long");
@@ -98,7 +99,8 @@ DialHandshake::State DialHandshake::take_frame(std::span<const std::byte> payloa
   }
   auto welcome = proto::decode<proto::Welcome>(payload);
   if (!welcome)
-    return fail(Fault::protocol, "cannot read the hub's WELCOME: " + welcome.error().sentence);
+    return fail(Fault::protocol,
+                "cannot read the hub's WELCOME: " + welcome.error().sentence + "; is it a hub?");
   welcome_ = std::move(*welcome);
   return State::welcome;
 }

@@ -3,14 +3,22 @@
 
 import json
 import os
+import pathlib
+import shutil
 import signal
 import socket
 import subprocess
+import tempfile
+import time
 import unittest
 
 from support.logs import robot_logs
-from support.processes import Hub, run_gimnet, start_gimnet, start_recv
+from support.processes import GIMNET, Hub, Process, run_gimnet, start_gimnet, start_recv
+from support.tap import Tap
 from support.waiting import wait_until
+from support.wire import OPENING, hello
+
+FULL = os.environ.get("GIMNET_STRESS") == "full"
 
 
 def linked(hub, to, within="a route"):
@@ -19,6 +27,15 @@ def linked(hub, to, within="a route"):
         hubs = json.loads(run_gimnet(hub, "hubs", "--json").out or "[]")
         return any(each["id"] == to and each["reachable"] for each in hubs)
     wait_until(there, f"{within} to hub {to}")
+
+
+def until_closed(connection, far_end):
+    """Reads until the other end closes the connection, or not at all."""
+    try:
+        while far_end and connection.recv(4096):
+            pass
+    except ConnectionResetError:
+        pass
 
 
 class Chain(unittest.TestCase):
@@ -106,6 +123,8 @@ class Refused(unittest.TestCase):
         closed = Hub(self, hub_id=1)
         dialler = Hub(self, "--link", closed.url, hub_id=2)
         self.error_of(dialler, "--accept-links")
+        for hub in (closed, dialler):
+            wait_until(lambda hub=hub: "start it with --accept-links" in hub.process.err, "the remedy in both logs")
 
     def test_two_hubs_with_one_id(self):
         first = Hub(self, "--accept-links", hub_id=1)
@@ -126,20 +145,51 @@ class Refused(unittest.TestCase):
         ids = {hub["id"] for hub in json.loads(run_gimnet(hubs[0], "hubs", "--json").out)}
         self.assertTrue(len(ids) == 2 and max(ids) >= 1024, ids)
 
-    def test_a_hub_that_dials_itself(self):
-        with socket.create_server(("127.0.0.1", 0)) as place:
-            port = place.getsockname()[1]
-        hub = Hub(self, "--accept-links", "--link", f"tcp://127.0.0.1:{port}",
-                  listen=[f"tcp://127.0.0.1:{port}"], hub_id=1)
-        self.error_of(hub, "same hub")
+    def test_a_hub_that_dials_itself_by_another_name_too(self):
+        hub = Hub(self, "--accept-links", hub_id=1)
+        for host in ("127.0.0.1", "localhost"):
+            added = run_gimnet(f"unix:{hub.socket_path}", "ctl", "link", "add", f"tcp://{host}:{hub.port}", "--name", "self")
+            self.assertEqual(added.code, 0, added.err)
+            self.error_of(hub, f"tcp://{host}:", "the link leads back to the same hub; name another one")
+            run_gimnet(f"unix:{hub.socket_path}", "ctl", "link", "remove", "self")
 
-    def test_something_that_is_no_hub(self):
-        with socket.create_server(("127.0.0.1", 0)) as server:
-            hub = Hub(self, "--link", f"tcp://127.0.0.1:{server.getsockname()[1]}", hub_id=1)
-            connection, _ = server.accept()
-            connection.sendall(b"HTTP/1.1 400 Bad Request\r\n\r\n")
-            self.error_of(hub, "does not speak GIMnet")
-            connection.close()
+    def test_robots_that_were_started_from_one_state_folder(self):
+        lab = Hub(self, "--accept-links", hub_id=1)
+        card = Hub(self, "--link", lab.url, hub_id=None)
+        linked(lab, card.status()["hub"]["id"])
+        card.process.signal(signal.SIGTERM)
+        card.process.wait()
+        robots = []
+        for _ in range(10):
+            state = os.path.join(self.enterContext(tempfile.TemporaryDirectory(prefix="gimnet-test-")), "state")
+            shutil.copytree(card.state, state)
+            robots.append(Hub(self, "--link", lab.url, hub_id=None, state=state))
+        remedy = "delete the state folder on one of the machines that have a copy of it"
+        wait_until(lambda: sum(remedy in robot.process.err for robot in robots) == 9, "the remedy in the logs of all but one")
+        self.assertIn(remedy, lab.process.err)
+        self.assertEqual(len(json.loads(run_gimnet(lab, "hubs", "--json").out)), 2, "one of them is in the network")
+
+    def test_things_that_are_no_hub(self):
+        """A web server, garbage, and an end that sends back what it gets, as a node's port would."""
+        talks = {"web": (b"HTTP/1.1 400 Bad Request\r\n\r\n", "does not speak GIMnet; is it a hub?"),
+                 "garbage": (bytes(range(256)) * 100, "does not speak GIMnet; is it a hub?"),
+                 "half": (OPENING + b"\xff" * 400, "something else than WELCOME; is it a hub?"),
+                 "node": (OPENING + hello("robot"), "is it a hub?"),
+                 "closed": (b"", "closed the connection before it said WELCOME; is it a hub?")}
+        hub = Hub(self, hub_id=1)
+        for name, (answer, _) in talks.items():
+            server = self.enterContext(socket.create_server(("127.0.0.1", 0)))
+            url = f"tcp://127.0.0.1:{server.getsockname()[1]}"
+            added = run_gimnet(f"unix:{hub.socket_path}", "ctl", "link", "add", url, "--name", name)
+            self.assertEqual(added.code, 0, added.err)
+            with server.accept()[0] as connection:
+                connection.sendall(answer)
+                until_closed(connection, bool(answer))
+        wait_until(lambda: all(f"link {name}: " in hub.process.err for name in talks), "a line of each")
+        for name, (_, words) in talks.items():
+            line = next(line for line in hub.process.err.splitlines() if f"link {name}: " in line)
+            self.assertIn(words, line)
+        self.assertEqual(run_gimnet(hub, "status").code, 0, "the rest goes on")
 
     def test_nobody_listens(self):
         with socket.create_server(("127.0.0.1", 0)) as place:
@@ -147,6 +197,114 @@ class Refused(unittest.TestCase):
         hub = Hub(self, "--link", f"tcp://127.0.0.1:{port}", hub_id=1)
         self.error_of(hub, "refused")
         self.assertEqual(run_gimnet(hub, "status").code, 0, "the rest goes on")
+
+
+class Between(unittest.TestCase):
+    """What a link of two hubs does."""
+
+    def states(self, hub):
+        return {link["name"]: link["state"] for link in json.loads(run_gimnet(hub, "links", "--json").out or "[]")}
+
+    def test_two_hubs_that_dial_each_other(self):
+        first = Hub(self, "--accept-links", hub_id=1)
+        second = Hub(self, "--accept-links", "--link", first.url, hub_id=2)
+        added = run_gimnet(f"unix:{first.socket_path}", "ctl", "link", "add", second.url, "--cost", "500")
+        self.assertEqual(added.code, 0, added.err)
+        wanted = {first.url: "up", second.url: "standby"}
+        for hub in (first, second):
+            wait_until(lambda hub=hub: self.states(hub) == wanted, "the cheaper link is up, the other one stands by")
+        receiver = start_recv(self, first, "B", "-n", "2")
+        wait_until(lambda: run_gimnet(second, "nodes", "B").code == 0, "B at the other hub")
+        self.assertEqual(run_gimnet(second, "send", "B", data=b"one\n").code, 0)
+        removed = run_gimnet(f"unix:{second.socket_path}", "ctl", "link", "remove", first.url)
+        self.assertEqual(removed.code, 0, removed.err)
+        wait_until(lambda: self.states(second) == {second.url: "up"}, "the other link carries")
+        self.assertEqual(run_gimnet(second, "send", "B", data=b"two\n").code, 0)
+        self.assertEqual((receiver.wait(), receiver.out), (0, b"one\ntwo\n"), receiver.err)
+
+    def test_a_link_that_may_not_speak_for_a_hub(self):
+        """Its frames are dropped, counted and logged, and it stays."""
+        file = os.path.join(self.enterContext(tempfile.TemporaryDirectory(prefix="gimnet-test-")), "hub.toml")
+        with open(file, "w", encoding="utf-8") as text:
+            text.write("[links]\naccept_links = true\nallow = [3]\n")
+        first = Hub(self, "--config", file, hub_id=1)
+        second = Hub(self, "--accept-links", "--link", first.url, hub_id=2)
+        third = Hub(self, "--link", second.url, hub_id=3)
+        linked(third, 1)
+        start_recv(self, first, "B")
+        there = first.wait_for_node("B")["id"]
+        self.assertEqual(run_gimnet(third, "ping", there, "-c", "1").code, 0)
+        self.assertEqual(run_gimnet(second, "ping", there, "-c", "1", "-W", "0.2").code, 5)
+        self.assertEqual(first.counter("dropped.wrong_source"), 1)
+        wait_until(lambda: "link to hub 2: dropped a frame of kind 0 whose source is at hub 2: that link may not speak for hub 2"
+                   in first.process.err, "the line of its log")
+        self.assertEqual(self.states(first), {first.url: "up"})
+
+    def test_a_hub_drains_beside_a_silent_link(self):
+        first = Hub(self, "--accept-links", hub_id=1)
+        network = Process([GIMNET, "impair", "tcp://127.0.0.1:0", first.url], stdin=subprocess.PIPE)
+        self.addCleanup(network.end)
+        wait_until(lambda: network.out.startswith(b"ready "), f"the network; it said: {network.err}")
+        second = Hub(self, "--link", network.out.decode().split()[1], hub_id=2)
+        linked(second, 1)
+        network.popen.stdin.write(b"stall\n")
+        network.popen.stdin.flush()
+        wait_until(lambda: b"ok" in network.out, "silence")
+        second.process.signal(signal.SIGTERM)
+        self.assertEqual(second.process.wait(), 0, second.process.err)
+        wait_until(lambda: not self.reaches(first, 2), "that it is gone")
+
+    def reaches(self, hub, other):
+        return any(each["id"] == other and each["reachable"] for each in json.loads(run_gimnet(hub, "hubs", "--json").out))
+
+    def test_three_idle_hubs_in_a_ring(self):
+        first = Hub(self, "--accept-links", hub_id=1)
+        taps = [Tap(self, first), Tap(self, first)]
+        second = Hub(self, "--accept-links", "--link", taps[0].url, hub_id=2)
+        taps.append(Tap(self, second))
+        third = Hub(self, "--link", taps[1].url, "--link", taps[2].url, hub_id=3)
+        hubs = (first, second, third)
+
+        def is_ring():
+            edges = json.loads(run_gimnet(first, "graph", "--json").out)["links"]
+            return len(edges) == 3 and all(edge["agreed"] for edge in edges)
+        wait_until(is_ring, "the ring")
+
+        def used_ns():
+            tasks = (task for hub in hubs for task in pathlib.Path(f"/proc/{hub.process.popen.pid}/task").iterdir())
+            return sum(int((task / "schedstat").read_text().split()[0]) for task in tasks)
+
+        def rates(length_s):
+            """Frames a second of each link, and the share of a processor that the hubs use."""
+            began, before, used = time.monotonic(), [tap.all_frames() for tap in taps], used_ns()
+            wait_until(lambda: time.monotonic() > began + length_s, "the end of the time", pause_s=length_s)
+            passed = time.monotonic() - began
+            return [(tap.all_frames() - count) / passed for tap, count in zip(taps, before)], (used_ns() - used) / passed / 1e9
+        # Costs fall for a moment after the start, and each fall is told.
+        seen = wait_until(lambda: (lambda found: found if max(found[0]) <= 10 else None)(rates(2)), "at most 10 frames a second", 20)
+        self.assertTrue(all(rate > 4 for rate in seen[0]), seen)
+        self.assertLess(seen[1], 0.01 if FULL else 0.1, "of a core")
+
+    def test_nodes_of_a_hub_that_is_gone_are_unreachable(self):
+        first = Hub(self, "--accept-links", hub_id=1)
+        second = Hub(self, "--link", first.url, hub_id=2)
+        start_recv(self, first, "B")
+
+        def state():
+            nodes = json.loads(run_gimnet(second, "nodes", "B", "--json").out or "[]")
+            return nodes[0]["state"] if nodes else None
+        wait_until(lambda: state() == "connected", "B at the other hub")
+        first.process.signal(signal.SIGKILL)
+        first.process.wait()
+        wait_until(lambda: state() == "unreachable", "that B cannot be reached")
+        ping = run_gimnet(second, "ping", "B", "-c", "1")
+        self.assertEqual(ping.code, 4)
+        self.assertIn("the node 'B' is unreachable: there is no way to its hub hub-1; `gimnet hubs` shows when", ping.err)
+        taken = run_gimnet(second, "recv", "--name", "B")
+        self.assertEqual(taken.code, 6)
+        self.assertRegex(taken.err, "the name 'B' is that of node 1[.][0-9]+ of hub 1, which cannot be reached; it is free in [0-9]+ s")
+        (hub,) = [hub for hub in json.loads(run_gimnet(second, "hubs", "--json").out) if hub["id"] == 1]
+        self.assertEqual((hub["reachable"], hub["distance"], hub["cost"], hub["via"]), (False, None, None, None))
 
 
 if __name__ == "__main__":

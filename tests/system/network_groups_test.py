@@ -3,13 +3,14 @@
 
 import json
 import pathlib
+import struct
 import subprocess
 import tempfile
 import unittest
 
 from stranger_parts.bitestream import BOOL, F64, TEXT, U32, every, fields, put
 from stranger_parts.case import PATIENT, Case
-from stranger_parts.client import BROADCAST, CTRL, GROUP, NS, UNICAST
+from stranger_parts.client import BROADCAST, CTRL, GROUP, LIST, NS, UNICAST
 from support.processes import BIN, Process, run_gimnet, start_gimnet
 from support.waiting import wait_until
 
@@ -191,10 +192,17 @@ class Ring(Case):
         self.hubs = [first, second, third, fourth]
         self.nodes = [self.stranger(hub, f"node-{hub_id}") for hub_id, hub in enumerate(self.hubs, 1)]
 
+        self.until_linked(5)
+
+    def until_linked(self, count):
         def all_links():
             graphs = [json.loads(run_gimnet(hub, "graph", "--json").out)["links"] for hub in self.hubs]
-            return all(len(edges) == 5 and all(edge["agreed"] for edge in edges) for edges in graphs)
-        wait_until(all_links, "all links")
+            return all(len(edges) == count and all(edge["agreed"] for edge in edges) for edges in graphs)
+
+        def all_ways():  # they follow the records a moment later
+            hubs = [json.loads(run_gimnet(hub, "hubs", "--json").out) for hub in self.hubs]
+            return all(sum(each["reachable"] for each in known) == len(self.hubs) for known in hubs)
+        wait_until(lambda: all_links() and all_ways(), "all links and ways")
 
     def test_a_broadcast_reaches_each_node_once(self):
         for sender in self.nodes:
@@ -212,6 +220,19 @@ class Ring(Case):
         self.assertEqual(self.nodes[2].data(BROADCAST).body, b"third")
         self.nodes[2].write(UNICAST, self.nodes[1].id, b"next")
         self.assertEqual(self.nodes[1].data().body, b"next")
+
+    def test_a_list_with_ids_of_five_hubs_reaches_each_once(self):
+        self.hubs.append(self.linked(5, self.hubs[2], self.hubs[3]))
+        nodes = [*self.nodes, self.stranger(self.hubs[4], "node-5"), self.stranger(self.hubs[1], "another-2")]
+        self.until_linked(7)
+        ids = sorted(node.id for node in nodes[1:])
+        for number in range(3):
+            nodes[0].write(LIST, len(ids), struct.pack(f"<{len(ids)}I", *ids) + bytes([number]))
+        for node in nodes[1:]:
+            got = [node.data(LIST) for _ in range(3)]
+            self.assertEqual([(each.src, each.body) for each in got], [(nodes[0].id, bytes([n])) for n in range(3)])
+            node.ping()
+            self.assertEqual(node.taken, 3)
 
     def test_a_group_crosses_each_link_once_and_finds_another_way(self):
         group = self.nodes[0].advertise("scan")[3]

@@ -241,6 +241,7 @@ HandlerContext Conductor::context_for(Effects& effects, milliseconds now) {
 
 void Conductor::on_link_frame(const ControlFrameEvent& event, milliseconds now) {
   const proto::FrameHeader header = proto::load_header(event.frame.data());
+  if (event.frame.size() == proto::kHeaderSize) return log_refused(event.node, header);
   const proto::Kind kind = header.kind;
   const std::span<const std::byte> payload = std::span{event.frame}.subspan(proto::kHeaderSize);
   if (kind == proto::Kind::route) {

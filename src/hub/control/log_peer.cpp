@@ -7,6 +7,8 @@
 #include <array>
 #include <cstdint>
 
+#include "base/log.hpp"
+
 namespace gimnet::hub {
 
 std::string remote_address(std::string_view transport, std::string_view address) {
@@ -29,6 +31,17 @@ std::string remote_address(std::string_view transport, std::string_view address)
     }
   }
   return host.starts_with("127.") ? std::string{} : host;
+}
+
+void log_refused(NodeId link, const proto::FrameHeader& header) {
+  const std::string neighbour = std::to_string(hub_of(link).value());
+  const std::string source = std::to_string(hub_of(NodeId{header.src}).value());
+  log_line(LogLevel::warning, {"dropped of link", neighbour},
+           "link to hub " + neighbour + ": dropped a frame of kind " +
+               std::to_string(static_cast<unsigned>(header.kind)) + " whose source is at hub " +
+               source + ": that link may not speak for hub " + source +
+               " (`allow` in docs/operations.md), or the frame is malformed; "
+               "`gimnet status --json` counts both");
 }
 
 }  // namespace gimnet::hub

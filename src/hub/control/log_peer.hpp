@@ -3,7 +3,9 @@
 #include <string>
 #include <string_view>
 
+#include "base/ids.hpp"
 #include "hub/control/state/identity.hpp"
+#include "proto/frame/frame_header.hpp"
 
 namespace gimnet::hub {
 
@@ -27,5 +29,8 @@ namespace gimnet::hub {
 [[nodiscard]] inline std::string crowd_of(const Identity& identity, std::string_view address) {
   return identity == Identity::open() ? remote_address("tcp", address) : identity.text();
 }
+
+/// Logs that a frame of the link to that hub was dropped.
+void log_refused(NodeId link, const proto::FrameHeader& header);
 
 }  // namespace gimnet::hub

@@ -210,8 +210,8 @@ using ShardCommand =
 // ---- shard -> conductor
 // --------------------------------------------------------------------------------------------
 
-/// A frame of kind NS or CTRL, of a link also ROUTE; `frame` is header and payload. `node` is the
-/// sender's, of a link the hub at its other end.
+/// A frame of kind NS or CTRL, of a link also ROUTE, or the header alone of one that was dropped.
+/// `frame` is header and payload. `node` is the sender's, of a link the hub at its other end.
 struct ControlFrameEvent {
   SessionRef session;
   std::uint32_t attachment = 0;  ///< of the connection that it came by

@@ -72,6 +72,8 @@ class ConnectionReader {
   void pass_on_report(Connection& connection, const proto::RunView& view);
   void pass_on_flow(Connection& connection, const proto::RunView& view);
   void drop_from_link(Connection& connection, const proto::RunView& view, proto::DropReason reason);
+  /// Tells the conductor, at most once a second, of a frame that a link should not have sent.
+  void tell_refused(const Connection& connection, const proto::RunView& view);
   void route(Connection& connection, const proto::NextRun& found);
   [[nodiscard]] bool handle_flow(Connection& connection, const proto::RunView& view);
   [[nodiscard]] bool handle_link(Connection& connection, const proto::RunView& view);
@@ -93,6 +95,7 @@ class ConnectionReader {
   Closer& closer_;
   std::uint64_t deliveries_end_ = 0;  ///< the router's count at which the share is used up
   Run mail_rest_;
+  std::uint64_t tell_refused_at_ms_ = 0;  ///< the next one is told then
 };
 
 }  // namespace gimnet::hub

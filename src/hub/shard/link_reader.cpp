@@ -68,6 +68,7 @@ bool ConnectionReader::handle_from_link(Connection& connection, const proto::Run
       return true;
     case Admission::wrong_source:
       state_.counters.wrong_source.add(view.frames);
+      tell_refused(connection, view);
       drop_from_link(connection, view, proto::DropReason::wrong_source);
       return true;
     case Admission::hop_limit:
@@ -78,8 +79,17 @@ bool ConnectionReader::handle_from_link(Connection& connection, const proto::Run
       break;
   }
   state_.counters.malformed.add(view.frames);
+  tell_refused(connection, view);
   drop_from_link(connection, view, proto::DropReason::malformed);
   return true;
+}
+
+void ConnectionReader::tell_refused(const Connection& connection, const proto::RunView& view) {
+  if (state_.now_ms < tell_refused_at_ms_) return;
+  tell_refused_at_ms_ = state_.now_ms + 1'000;
+  ControlFrameEvent event{connection.session(), connection.attachment, connection.node, {}};
+  event.frame.assign(view.bytes, view.bytes + proto::kHeaderSize);
+  state_.tell_conductor({state_.self, std::move(event)});
 }
 
 void ConnectionReader::drop_from_link(Connection& connection, const proto::RunView& view,

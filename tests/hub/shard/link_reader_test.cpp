@@ -148,6 +148,17 @@ TEST(LinkReader, WhoSpeaksForThisHubIsDroppedAndTheLinkStays) {
   EXPECT_THAT(node.texts(), ElementsAre("honest"));
   EXPECT_FALSE(link.goodbye);
   EXPECT_EQ(rig.dropped(DropReason::wrong_source), 1u);
+  const auto headers_told = [&rig] {
+    return std::ranges::count_if(rig.take_events(), [](const ShardEvent& event) {
+      const auto* frame = std::get_if<ControlFrameEvent>(&event.what);
+      return frame != nullptr && frame->frame.size() == proto::kHeaderSize;
+    });
+  };
+  EXPECT_EQ(headers_told(), 1);
+  rig.write(link, frame_after(0, node.id.value(), "liar", {}, node.id.value()));
+  rig.settle();
+  EXPECT_EQ(rig.dropped(DropReason::wrong_source), 2u);
+  EXPECT_EQ(headers_told(), 0) << "at most once a second";
 }
 
 TEST(LinkReader, AFrameThatIsNotUnderstoodIsDroppedAndTheLinkStays) {

@@ -12,6 +12,7 @@ class FrameCount:
 
     def __init__(self, opening=OPENING_SIZE):
         self.frames = 0
+        self.all = 0  # with those for the hub
         self._head = bytearray()
         self._left = opening  # bytes of it, or of a payload, that are to come
         self._is_data = False
@@ -33,6 +34,7 @@ class FrameCount:
                 self._is_data = self._head[12] < FIRST_OF_CONTROL and self._head[12] not in (REPORT, FLOW)
                 self._head.clear()
             if not self._left and not self._head:
+                self.all += 1
                 self.frames += self._is_data
                 self._is_data = False
 
@@ -65,6 +67,10 @@ class Tap:
     def got(self):
         """Frames that came by on their way from the hub."""
         return sum(down.frames for _, down in list(self._counts))
+
+    def all_frames(self):
+        """Both ways, with those for the hub."""
+        return sum(up.all + down.all for up, down in list(self._counts))
 
     def _accept(self):
         try:

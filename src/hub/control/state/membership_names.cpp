@@ -48,9 +48,10 @@ std::optional<proto::Goodbye> Membership::network_refusal(std::string_view name,
   if (known->standing == proto::ns::NameStanding::away) return std::nullopt;
   if (known->claim->node == former) return std::nullopt;  // nobody can be asked for a better proof
   const auto left = std::max<std::int64_t>(1, (known->until - now).count() / 1'000);
-  return taken(quoted(name) + "is that of " + holder_of(*known) +
-               ", which cannot be reached; it is free in " + std::to_string(left) +
-               " s, unless that hub comes back: wait");
+  return proto::Goodbye{GoodbyeCode::name_taken,
+                        quoted(name) + "is that of " + holder_of(*known) +
+                            ", which cannot be reached; it is free in " + std::to_string(left) +
+                            " s, unless that hub comes back; wait, or choose another name"};
 }
 
 std::optional<proto::Refusal> Membership::service_name_refusal(std::string_view full_name) const {
