@@ -74,6 +74,13 @@ GIMNET_API gimi_status gimi_close(gimi_handle handle);
 GIMNET_API gimi_peer gimi_id(gimi_handle node);
 /** Fills the struct, as much as its struct_size says. After gimi_leave(): as it was then. */
 GIMNET_API gimi_status gimi_state(gimi_handle node, gimi_node_state* state);
+/** Tells the events of the connection of a node. The first one is that which was the last when this
+ * was called: so it says what is. */
+GIMNET_API gimi_status gimi_watch_connection(gimi_handle node, gimi_handle* events);
+/** Takes the next event. GIMI_TIMEOUT. When all are taken and none will come: GIMI_CLOSED, or why
+ * no connection will come. */
+GIMNET_API gimi_status gimi_connection_receive(gimi_handle events, int32_t timeout_ms,
+                                               gimi_connection_event* event);
 GIMNET_API gimi_status gimi_lost(gimi_handle node, gimi_lost_counts* counts);
 /** Takes another name in place of the one this node has. Id and subscriptions stay; services end
  * under their former full names and begin under the new ones. GIMI_TAKEN, GIMI_BAD_NAME. */
@@ -110,6 +117,10 @@ GIMNET_API size_t gimi_subscribers(gimi_handle publisher);
 /** Waits until there are that many. */
 GIMNET_API gimi_status gimi_wait_for_subscribers(gimi_handle publisher, size_t count,
                                                  int32_t timeout_ms);
+/** Waits until the number of subscribers is another one than this call told last, and tells it; the
+ * first call does not wait. A camera that nobody watches rests in it. GIMI_TIMEOUT, GIMI_CLOSED. */
+GIMNET_API gimi_status gimi_subscribers_changed(gimi_handle publisher, int32_t timeout_ms,
+                                                size_t* count);
 /** The number of messages that gimi_publish() sent. */
 GIMNET_API uint64_t gimi_published(gimi_handle publisher);
 /** The number of messages that gimi_publish() dropped, since the hub was away. */

@@ -94,6 +94,12 @@ class Node : public HubAccess {
     return detail::state_of(state);
   }
 
+  /// Tells what becomes of the connection: lost, back, ended, and why. Errors: closed.
+  Outcome<ConnectionWatch> watch_connection() const {
+    return detail::made<ConnectionWatch>(
+        [&](gimi_handle* made) { return gimi_watch_connection(handle_, made); });
+  }
+
   // ---- sending
 
   /// A stream to a node, which find() finds. Errors: bad_argument (also other options than an

@@ -190,6 +190,15 @@ typedef struct gimi_node_state {
   char trouble[GIMI_SENTENCE_BYTES_MAX + 1]; /**< Why the connection broke last. */
 } gimi_node_state;
 
+/** An event of a node's connection. */
+typedef struct gimi_connection_event {
+  size_t struct_size; /**< Set by the caller. */
+  gimi_connection_change change;
+  uint32_t skipped;                      /**< Events right before it that went, since 64 waited. */
+  int64_t when_ns;                       /**< By this machine's clock, ns since 1970. */
+  char why[GIMI_SENTENCE_BYTES_MAX + 1]; /**< The cause in words; GIMNET_LOG=info shows it, too. */
+} gimi_connection_event;
+
 /** Losses: messages and frames that were on their way to a node and cannot be given out. */
 typedef struct gimi_lost_counts {
   size_t struct_size;         /**< Set by the caller. */

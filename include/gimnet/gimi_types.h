@@ -12,9 +12,9 @@
 extern "C" {
 #endif
 
-/** Names a node, publisher, subscription, queue, sender, watch, answering service, request or wait
- * set: kind (8 bits), slot (24 bits) and generation (32 bits). 0 is no handle. One of another kind,
- * closed, or never given is refused. */
+/** Names a node, publisher, subscription, queue, sender, watch, answering service, request, wait
+ * set or the events of a connection: kind (8 bits), slot (24 bits) and generation (32 bits). 0 is
+ * no handle. One of another kind, closed, or never given is refused. */
 typedef uint64_t gimi_handle;
 
 /** The id of a node: hub << 20 | index, shown as `7.17`. 0 is nobody. */
@@ -155,6 +155,16 @@ enum {
   GIMI_ADVERTISED = 9,
   GIMI_WITHDRAWN = 10,   /**< A service: only its name, group id and node are told. */
   GIMI_WATCH_ENDED = 255 /**< After a reconnect the hub did not take the watch again. */
+};
+
+/** The changes of the connection between a node and its hub. */
+typedef int32_t gimi_connection_change;
+enum {
+  GIMI_CONNECTED = 0,       /**< The first connection. */
+  GIMI_CONNECTION_LOST = 1, /**< The library dials again. */
+  GIMI_RESUMED = 2,         /**< There is a connection again, and nothing was lost. */
+  GIMI_CONNECTED_ANEW = 3,  /**< There is one again; what was on its way is lost. */
+  GIMI_CONNECTION_ENDED = 4 /**< No connection will come any more. */
 };
 
 /** The application's kind of a message: it selects a queue of the receiver. */

@@ -32,10 +32,11 @@ typedef struct gimi_ready {
  * GIMI_LIMIT. */
 GIMNET_API gimi_status gimi_wait_set_create(gimi_handle* set);
 /** Makes a handle a member, of any node: a subscription, a queue, an accepted service, an answering
- * service, a watch, a request that was asked with gimi_ask_later(), or a node, from which
- * gimi_receive() takes too. Closing the handle removes it. GIMI_TAKEN: it, or another handle of the
- * same queue, is in a set. GIMI_BAD_ARGUMENT: nothing is received from such a handle. GIMI_CLOSED:
- * also of a request that has given its end. */
+ * service, a watch, a request that was asked with gimi_ask_later(), a publisher, which has
+ * something while gimi_subscribers_changed() would not wait, the events of a connection, or a node,
+ * from which gimi_receive() takes too. Closing the handle removes it. GIMI_TAKEN: it, or another
+ * handle of the same queue, is in a set. GIMI_BAD_ARGUMENT: nothing is received from such a handle.
+ * GIMI_CLOSED: also of a request that has given its end. */
 GIMNET_API gimi_status gimi_wait_set_add(gimi_handle set, gimi_handle member, uint64_t user);
 /** When it returns, no call of gimi_wait_set_wait() will give the member any more. GIMI_NOT_FOUND:
  * it is not in this set. GIMI_CLOSED: the handle was closed, which had removed it. */

@@ -16,12 +16,12 @@ from .errors import (BadArgument, BadName, BadVersion, Busy, Closed, Denied, Exp
                      NoHost, NoHub, NoRight, NotConnected, NotDelivered, NotFound, NotRetained, NotTrusted, Protocol,
                      Refused, Silence, System, Taken, Timeout, TooLarge, WindowFull)
 from .messages import Event, Message, NodeRecord, Peer, ServiceRecord
-from .node import Node, Publisher, Source, State, Watch, connect
+from .node import ConnectionEvent, ConnectionWatch, Node, Publisher, Source, State, Watch, connect
 from .requests import Answers, Pending, Reply, Request
 from .wait_set import WaitSet
 
 __all__ = [
-    "Answers", "BadArgument", "BadName", "BadVersion", "BitestreamError", "Busy", "Closed", "Denied", "Event", "Expired",
+    "Answers", "BadArgument", "BadName", "BadVersion", "BitestreamError", "Busy", "Closed", "ConnectionEvent", "ConnectionWatch", "Denied", "Event", "Expired",
     "Failed", "Forked", "GimnetError", "Gone", "Limit", "Message", "NameTaken", "NoHost", "NoHub", "NoRight", "Node", "NodeRecord", "NotConnected",
     "NotDelivered", "NotFound", "NotRetained", "NotTrusted", "Peer", "Pending", "Protocol", "Publisher", "Refused", "Reply",
     "Request", "ServiceRecord", "Silence",

@@ -55,6 +55,11 @@ GIMI_ACCEPTS = 1
 GIMI_BEGINS_STREAM = 0x01
 GIMI_PLAIN = 0x02
 GIMI_STAMPED = 0x08
+GIMI_CONNECTED = 0
+GIMI_CONNECTION_LOST = 1
+GIMI_RESUMED = 2
+GIMI_CONNECTED_ANEW = 3
+GIMI_CONNECTION_ENDED = 4
 GIMI_WATCH_NODES = 1
 GIMI_WATCH_SERVICES = 2
 GIMI_NAME_BYTES_MAX = 255
@@ -147,6 +152,11 @@ class gimi_node_state(ctypes.Structure):
                 ("hub_name", c_char * (GIMI_NAME_BYTES_MAX + 1)), ("trouble", c_char * (GIMI_SENTENCE_BYTES_MAX + 1))]
 
 
+class gimi_connection_event(ctypes.Structure):
+    _fields_ = [("struct_size", c_size_t), ("change", c_int32), ("skipped", c_uint32), ("when_ns", c_int64),
+                ("why", c_char * (GIMI_SENTENCE_BYTES_MAX + 1))]
+
+
 class gimi_queue_counts(ctypes.Structure):
     _fields_ = [("struct_size", c_size_t), ("waiting", c_uint64), ("received", c_uint64), ("overwritten", c_uint64),
                 ("missed", c_uint64)]
@@ -181,9 +191,12 @@ _STATUS_FUNCTIONS = {
     "gimi_join": [POINTER(gimi_node_options), _HANDLE_OUT],
     "gimi_close": [_HANDLE],
     "gimi_state": [_HANDLE, POINTER(gimi_node_state)],
+    "gimi_watch_connection": [_HANDLE, _HANDLE_OUT],
+    "gimi_connection_receive": [_HANDLE, c_int32, POINTER(gimi_connection_event)],
     "gimi_advertise": [_HANDLE, c_char_p, POINTER(gimi_publish_options), _HANDLE_OUT],
     "gimi_publish": [_HANDLE, c_void_p, c_size_t, c_int32, c_int32],
     "gimi_wait_for_subscribers": [_HANDLE, c_size_t, c_int32],
+    "gimi_subscribers_changed": [_HANDLE, c_int32, POINTER(c_size_t)],
     "gimi_service_name": [_HANDLE, c_char_p, c_size_t],
     "gimi_subscribe": [_HANDLE, c_char_p, POINTER(gimi_subscribe_options), _HANDLE_OUT],
     "gimi_accept": [_HANDLE, c_char_p, POINTER(gimi_accept_options), _HANDLE_OUT],

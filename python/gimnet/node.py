@@ -13,7 +13,7 @@ from .handles import Blocking, Exit, Handle, Raw, Stream, Waitable, in_pieces, s
 from .messages import Event, Message, NodeRecord, Peer, ServiceRecord
 from .requests import Answers, Pending, Reply
 
-__all__ = ["Node", "Publisher", "Source", "State", "Watch", "connect"]
+__all__ = ["ConnectionEvent", "ConnectionWatch", "Node", "Publisher", "Source", "State", "Watch", "connect"]
 
 class Source(Stream[Message]):
     """The messages of a subscription, or of an accepted service. A message counts as taken when
@@ -67,6 +67,37 @@ class Watch(Stream[Event]):
             _c.lib.gimi_watch_event_release(raw)
 
 
+@dataclass(frozen=True)
+class ConnectionEvent:
+    """What became of the connection of a node: `change` is connected, lost, resumed (nothing was lost),
+    connected anew (what was on its way is lost) or ended (none will come any more). `why` is the cause in
+    words, `when` in seconds since 1970. `skipped` events before it went, since 64 waited."""
+
+    change: str
+    why: str
+    when: float
+    skipped: int
+
+
+_CONNECTION_CHANGES = {_c.GIMI_CONNECTED: "connected", _c.GIMI_CONNECTION_LOST: "lost", _c.GIMI_RESUMED: "resumed",
+                       _c.GIMI_CONNECTED_ANEW: "connected anew", _c.GIMI_CONNECTION_ENDED: "ended"}
+
+
+class ConnectionWatch(Stream[ConnectionEvent]):
+    """What becomes of the connection of a node. The first event is the one that was the last."""
+
+    def __init__(self, node: Node, handle: int) -> None:
+        super().__init__(handle)
+        self._node = node
+
+    def receive(self, timeout: Optional[float] = None) -> ConnectionEvent:
+        """Timeout, Closed; after the event `ended` why no connection will come."""
+        raw = sized(_c.gimi_connection_event)
+        self.wait(timeout, lambda ms: _c.lib.gimi_connection_receive(self._handle, ms, raw))
+        change = _CONNECTION_CHANGES.get(raw.change, str(raw.change))
+        return ConnectionEvent(change, raw.why.decode(errors="replace"), raw.when_ns / 1e9, raw.skipped)
+
+
 class Publisher(Blocking):
     """A service that this node provides, until close() or the end of the node."""
 
@@ -102,6 +133,13 @@ class Publisher(Blocking):
     def wait_for_subscribers(self, count: int = 1, timeout: Optional[float] = None) -> None:
         """Timeout, Closed."""
         self.wait(timeout, lambda ms: _c.lib.gimi_wait_for_subscribers(self._handle, count, ms))
+
+    def subscribers_changed(self, timeout: Optional[float] = None) -> int:
+        """Waits until their number is another one than this told last, and tells it; the first call does not
+        wait. Timeout, Closed."""
+        count = ctypes.c_size_t()
+        self.wait(timeout, lambda ms: _c.lib.gimi_subscribers_changed(self._handle, ms, count))
+        return count.value
 
 
 @dataclass(frozen=True)
@@ -148,6 +186,10 @@ class Node(Waitable):
         return State(Peer(raw.id), raw.name.decode(), raw.hub_id, raw.hub_name.decode(), bool(raw.connected), bool(raw.ended),
                      raw.reconnects, raw.trouble.decode(errors="replace"), raw.hub_round_trip_ns / 1e9,
                      raw.hub_clock_offset_ns / 1e9)
+
+    def watch_connection(self) -> ConnectionWatch:
+        """Tells what becomes of the connection: lost, back, ended, and why."""
+        return ConnectionWatch(self, self._opened(_c.lib.gimi_watch_connection))
 
     @property
     def id(self) -> Peer:

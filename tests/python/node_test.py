@@ -124,6 +124,24 @@ class Nodes(TwoNodes):
         state = self.viewer.state()
         self.assertEqual((state.name, state.connected, state.ended), ("viewer", True, False))
 
+    def test_tells_what_becomes_of_the_connection_and_of_subscribers(self):
+        connection, waits = self.viewer.watch_connection(), gimnet.WaitSet()
+        waits.add(connection)
+        self.assertEqual(waits.wait(PATIENCE_S), [connection])
+        event = connection.receive(0)
+        self.assertEqual((event.change, event.skipped), ("connected", 0))
+        self.assertIn("connected to the hub", event.why)
+        eye = self.robot.advertise("eye")
+        self.assertEqual(eye.subscribers_changed(0), 0)
+        with self.assertRaises(gimnet.Timeout):
+            eye.subscribers_changed(0)
+        seen = self.viewer.subscribe("robot/eye")
+        self.assertEqual(eye.subscribers_changed(PATIENCE_S), 1)
+        seen.close()
+        self.viewer.close()
+        self.assertEqual(waits.wait(PATIENCE_S), [connection])
+        self.assertEqual(list(connection), [])
+
     def test_errors_are_classes_with_sentences(self):
         for wrong, call in ((gimnet.NameTaken, lambda: gimnet.connect("robot", hub=self.hub.url)),
                             (gimnet.NoHub, lambda: gimnet.connect(hub="tcp://127.0.0.1:1")),

@@ -52,8 +52,9 @@ class Executor {
   Executor& operator=(const Executor&) = delete;
 
   /// Calls `callback(Message)` for each message of a Subscription or Queue (so of an accepted
-  /// service), `callback(Request)` for each of Answers, `callback(WatchEvent)` for each of a Watch.
-  /// Every member gets its turn: one message in each. Errors: taken (it is in a WaitSet, or has a
+  /// service), `callback(Request)` for each of Answers, `callback(WatchEvent)` for each of a Watch,
+  /// `callback(ConnectionEvent)` for each of a ConnectionWatch. Every member gets its turn: one
+  /// message in each. Errors: taken (it is in a WaitSet, or has a
   /// callback), closed.
   template <class Source, class Callback>
   Added on(const Source& source, Callback callback) {
@@ -61,6 +62,15 @@ class Executor {
       auto got = source.receive(kNoWait);
       if (got) callback(std::move(*got));
       return got.ok() || !has_ended(got.failure().status);
+    });
+  }
+  /// Calls `callback(std::size_t)` with the number of subscribers, at first and when it changes.
+  template <class Callback>
+  Added on(const Publisher& publisher, Callback callback) {
+    return add(publisher, [publisher, callback = std::move(callback)]() mutable {
+      const auto count = publisher.subscribers_changed(kNoWait);
+      if (count) callback(*count);
+      return count.ok() || !has_ended(count.failure().status);
     });
   }
   /// Calls `callback(Reply)` with the end of a request.

@@ -10,6 +10,7 @@
 
 #include "gimnet/gimi/conversions.hpp"
 #include "gimnet/gimi/message.hpp"
+#include "gimnet/gimi/node_state.hpp"
 #include "gimnet/gimi/options.hpp"
 #include "gimnet/gimi/outcome.hpp"
 #include "gimnet/gimi/records.hpp"
@@ -227,6 +228,15 @@ class Publisher {
     return detail::outcome_of(
         gimi_wait_for_subscribers(handle_->value(), count, milliseconds_of(timeout)));
   }
+  /// Waits until their number is another one than this told last, and tells it; the first call does
+  /// not wait. A camera that nobody watches rests in it. Errors: timeout, closed.
+  Outcome<std::size_t> subscribers_changed(Timeout timeout = kForever) const {
+    std::size_t count = 0;
+    const gimi_status status =
+        gimi_subscribers_changed(handle_->value(), milliseconds_of(timeout), &count);
+    if (status != GIMI_OK) return failure_of(status);
+    return count;
+  }
   /// In full, as it is now: another one after Node::take_name().
   [[nodiscard]] std::string name() const { return detail::service_name(*handle_); }
   /// Messages that publish() sent.
@@ -244,6 +254,9 @@ class Publisher {
   [[nodiscard]] Outcome<void> standing() const {
     return detail::outcome_of(gimi_standing(handle_->value()));
   }
+
+  /// For the C functions, and for a WaitSet, which waits for what subscribers_changed() tells.
+  [[nodiscard]] gimi_handle c_handle() const { return handle_->value(); }
 
   /// Made by Node.
   explicit Publisher(detail::SharedHandle handle) : handle_(std::move(handle)) {}
@@ -324,6 +337,31 @@ class Watch {
 
   /// Made by Node.
   explicit Watch(detail::SharedHandle handle) : handle_(std::move(handle)) {}
+
+ private:
+  detail::SharedHandle handle_;
+};
+
+/// The events of the connection of a node, with causes. The first event is the one that was the
+/// last when this was made: it says what is. 64 wait. Copies are the same.
+class ConnectionWatch {
+ public:
+  /// Takes the next event. Waits if there is none. Errors: timeout; when all are taken and none
+  /// will come, closed, or why no connection will come.
+  Outcome<ConnectionEvent> receive(Timeout timeout = kForever) const {
+    gimi_connection_event event{};
+    event.struct_size = sizeof event;
+    const gimi_status status =
+        gimi_connection_receive(handle_->value(), milliseconds_of(timeout), &event);
+    if (status != GIMI_OK) return failure_of(status);
+    return ConnectionEvent{static_cast<ConnectionChange>(event.change), event.skipped,
+                           event.when_ns, event.why};
+  }
+  /// For the C functions, and for a WaitSet.
+  [[nodiscard]] gimi_handle c_handle() const { return handle_->value(); }
+
+  /// Made by Node.
+  explicit ConnectionWatch(detail::SharedHandle handle) : handle_(std::move(handle)) {}
 
  private:
   detail::SharedHandle handle_;

@@ -26,6 +26,27 @@ struct NodeState {
   std::uint64_t last_messages_not_kept = 0;
 };
 
+/// The changes of the connection between a node and its hub.
+enum class ConnectionChange : std::int32_t {
+  connected = 0,       ///< the first connection
+  lost = 1,            ///< the library dials again
+  resumed = 2,         ///< there is a connection again, and nothing was lost
+  connected_anew = 3,  ///< there is one again; what was on its way is lost
+  ended = 4,           ///< no connection will come any more
+};
+
+struct ConnectionEvent {
+  ConnectionChange change = ConnectionChange::connected;
+  std::uint32_t skipped = 0;  ///< events right before it that went, since 64 waited
+  std::int64_t when_ns = 0;   ///< by this machine's clock, ns since 1970
+  std::string why;            ///< the cause in words
+
+  /// There is a connection now.
+  [[nodiscard]] bool is_connected() const {
+    return change != ConnectionChange::lost && change != ConnectionChange::ended;
+  }
+};
+
 /// Losses: messages and frames that were on their way to a node and cannot be given out.
 struct LostCounts {
   std::uint64_t incomplete =

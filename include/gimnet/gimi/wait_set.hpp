@@ -15,12 +15,12 @@
 
 namespace gimnet::inline v0_9 {
 
-/// Subscriptions, Queues (of accepted services too), Answers, Watches, PendingReplies and Nodes, of
-/// which wait() tells which have something. It is level-triggered: a member that has something is
-/// told again and again until the program took it, so no wake-up is lost. Each is in at most one
-/// set; copies are the same set, and with the last copy of a member it is in none. The cost of a
-/// call does not depend on the number of members. Thread safety: any thread. Limit: as many
-/// members as a process may have handles.
+/// Subscriptions, Queues (of accepted services too), Answers, Watches, PendingReplies, Publishers
+/// (whose subscribers change), ConnectionWatches and Nodes, of which wait() tells which have
+/// something. It is level-triggered: a member that has something is told again and again until the
+/// program took it, so no wake-up is lost. Each is in at most one set; copies are the same set, and
+/// with the last copy of a member it is in none. The cost of a call does not depend on the number
+/// of members. Thread safety: any thread. Limit: as many members as a process may have handles.
 class WaitSet {
  public:
 #if defined(__cpp_exceptions)

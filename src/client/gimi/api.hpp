@@ -41,6 +41,10 @@ struct PublisherObject final : Object {
       : core(std::move(the_core)), service(the_service) {}
   ~PublisherObject() override { core->services().withdraw(service); }
   void end() override { service.end({Status::closed, "the service was withdrawn"}); }
+  bool visit_source(const SourceVisitor& visitor) override {
+    service.visit(visitor);
+    return true;
+  }
   const SharedCore core;
   PublishedService& service;
 };
@@ -94,6 +98,20 @@ struct WatchObject final : Object {
   }
   const SharedCore core;
   const WatchQueues::Begun watch;
+};
+
+struct ConnectionObject final : Object {
+  static constexpr HandleKind kKind = HandleKind::connection;
+  ConnectionObject(SharedCore the_core, ConnectionEvents::Queue the_queue)
+      : core(std::move(the_core)), queue(std::move(the_queue)) {}
+  ~ConnectionObject() override { core->connection().remove(queue); }
+  void end() override { queue->end({Status::closed, "the handle of these events was closed"}); }
+  bool visit_source(const SourceVisitor& visitor) override {
+    queue->visit(visitor);
+    return true;
+  }
+  const SharedCore core;
+  const ConnectionEvents::Queue queue;
 };
 
 /// Runs `body` so that no exception crosses into C.

@@ -2,10 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <cstdio>
-#include <cstdlib>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -30,19 +27,6 @@ std::size_t nif_bytes_max(std::size_t message_bytes_max) {
   const std::size_t whole =
       std::max<std::size_t>(message_bytes_max, proto::kWindowDefault) + kHeaderRoom;
   return std::min<std::size_t>(whole, NIF_MESSAGE_BYTES_MAX);
-}
-
-/// Tells a line on standard error, where GIMNET_LOG=info asks for it: what became of the connection
-/// of a node, and why.
-void tell(nif_node* node, const std::string& words) {
-  const char* const level = std::getenv("GIMNET_LOG");
-  if (level == nullptr || std::string_view(level) != "info") return;
-  nif_info info{};
-  info.struct_size = sizeof info;
-  static_cast<void>(nif_get_info(node, &info));
-  const std::string name = *info.name != '\0' ? info.name : Peer{info.id}.text();
-  const std::string line = "gimnet: " + name + ": " + words + "\n";
-  static_cast<void>(std::fwrite(line.data(), 1, line.size(), stderr));
 }
 
 }  // namespace
@@ -119,7 +103,7 @@ nif_status Core::connect(const NodeOptions& options) {
   const nif_status status = nif_connect(&how, &node);
   if (status != NIF_OK) return status;
   uplink_.open(node);
-  tell(node, "connected to the hub " + state_now().hub_name);
+  tell(ConnectionChange::connected, "connected to the hub " + state_now().hub_name);
   clerk_.start();
   ready_ = true;
   static_cast<void>(nif_deliver(node));
@@ -153,6 +137,7 @@ void Core::end(const Ending& ending) {
   pings_.end(ending);
   requests_.end(ending);
   answers_.end(ending);
+  connection_.end(ending);
 }
 
 NodeState Core::state() const {
@@ -264,10 +249,20 @@ void Core::on_gap(const nif_incoming& in) {
   losses_.add(reason, in.count == NIF_COUNT_UNKNOWN ? 1 : in.count);
 }
 
+void Core::tell(ConnectionChange change, std::string why) {
+  nif_info info{};
+  info.struct_size = sizeof info;
+  static_cast<void>(nif_get_info(node(), &info));
+  connection_.tell(change, *info.name != '\0' ? info.name : Peer{info.id}.text(), std::move(why));
+}
+
 void Core::on_connected(const nif_incoming& in) {
   const bool resumed = (in.flags & NIF_CONNECTED_RESUMED) != 0;
-  tell(node(), resumed ? "the hub is back, and nothing was lost"
-                       : "the hub is back, and what was on its way is lost");
+  if (resumed) {
+    tell(ConnectionChange::resumed, "the hub is back, and nothing was lost");
+  } else {
+    tell(ConnectionChange::connected_anew, "the hub is back, and what was on its way is lost");
+  }
   reception_.on_reconnected();
   streams_.on_interrupted(0);
   services_.on_reconnected();
@@ -282,12 +277,12 @@ void Core::on_disconnected(const nif_incoming& in) {
     // NIF answers every call with the reason from now on; this one does nothing else.
     const nif_status status = nif_flush(node());
     const Ending ending(status_of(status), nif_error_text());
-    tell(node(), "no connection will come any more: " + ending.why());
+    tell(ConnectionChange::ended, "no connection will come any more: " + ending.why());
     streams_.on_broken({LossReason::connection_lost, ending.why()});
     end(ending);
     return;
   }
-  tell(node(), std::string("lost the connection to the hub: ") + in.text);
+  tell(ConnectionChange::lost, std::string("lost the connection to the hub: ") + in.text);
   nif_info info{};
   info.struct_size = sizeof info;
   const bool kept = nif_get_info(node(), &info) == NIF_OK && info.resume != 0;

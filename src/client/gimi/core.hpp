@@ -9,6 +9,7 @@
 #include "base/mutex.hpp"
 #include "client/gimi/answer_queue.hpp"
 #include "client/gimi/clerk.hpp"
+#include "client/gimi/connection_events.hpp"
 #include "client/gimi/inbox.hpp"
 #include "client/gimi/loss_tally.hpp"
 #include "client/gimi/open_requests.hpp"
@@ -44,6 +45,7 @@ class Core {
   [[nodiscard]] WatchQueues& watches() { return watches_; }
   [[nodiscard]] OpenRequests& requests() { return requests_; }
   [[nodiscard]] AnswerTable& answers() { return answers_; }
+  [[nodiscard]] ConnectionEvents& connection() { return connection_; }
   /// Something is to be looked after at certain times.
   void attend() { clerk_.attend(true); }
   [[nodiscard]] LostCounts lost() const;
@@ -61,6 +63,8 @@ class Core {
   void on_gap(const nif_incoming& in);
   void on_connected(const nif_incoming& in);
   void on_disconnected(const nif_incoming& in);
+  /// Tells what became of the connection.
+  void tell(ConnectionChange change, std::string why);
   void end(const Ending& ending);
 
   Uplink uplink_;
@@ -70,6 +74,7 @@ class Core {
   WatchQueues watches_;
   OpenRequests requests_;
   AnswerTable answers_;
+  ConnectionEvents connection_;
   PingTable pings_;
   LossTally losses_;
   mutable std::atomic<std::uint64_t> unreadable_{0};  ///< as NIF counted when it was asked last

@@ -108,6 +108,31 @@ gimi_status gimi_state(gimi_handle node, gimi_node_state* state) {
   });
 }
 
+gimi_status gimi_watch_connection(gimi_handle node, gimi_handle* events) {
+  if (events == nullptr) return is_null("gimi_watch_connection(): events");
+  *events = 0;
+  return with<NodeObject>(node, [&](NodeObject& found) {
+    return give<ConnectionObject>(events, found.core, found.core->connection().begin());
+  });
+}
+
+gimi_status gimi_connection_receive(gimi_handle events, int32_t timeout_ms,
+                                    gimi_connection_event* event) {
+  return with<ConnectionObject>(events, [&](ConnectionObject& found) -> gimi_status {
+    if (!nif::has_size(event))
+      return is_null("gimi_connection_receive(): event, or its struct_size,");
+    const auto told = found.queue->receive(timeout_of(timeout_ms));
+    if (!told) return fail(told.failure());
+    gimi_connection_event whole{};
+    whole.change = static_cast<gimi_connection_change>(told->change);
+    whole.skipped = told->skipped;
+    whole.when_ns = told->when_ns;
+    copy_text(told->why, whole.why, sizeof whole.why);
+    nif::write_struct(whole, *event);
+    return GIMI_OK;
+  });
+}
+
 gimi_status gimi_lost(gimi_handle node, gimi_lost_counts* counts) {
   return with_core(node, [&](Core& core) -> gimi_status {
     if (!nif::has_size(counts)) return is_null("gimi_lost(): counts, or its struct_size,");

@@ -113,6 +113,17 @@ gimi_status gimi_wait_for_subscribers(gimi_handle publisher, size_t count, int32
   });
 }
 
+gimi_status gimi_subscribers_changed(gimi_handle publisher, int32_t timeout_ms, size_t* count) {
+  if (count == nullptr) return is_null("gimi_subscribers_changed(): count");
+  *count = 0;
+  return with<PublisherObject>(publisher, [&](PublisherObject& found) -> gimi_status {
+    const auto changed = found.service.subscribers_changed(timeout_of(timeout_ms));
+    if (!changed) return fail(changed.failure());
+    *count = *changed;
+    return GIMI_OK;
+  });
+}
+
 uint64_t gimi_published(gimi_handle publisher) {
   uint64_t count = 0;
   static_cast<void>(with<PublisherObject>(publisher, [&](PublisherObject& found) -> gimi_status {

@@ -24,6 +24,7 @@ enum class HandleKind : std::uint8_t {
   pending = 7,
   answers = 8,
   wait_set = 9,
+  connection = 10,
 };
 
 /// The object that a handle stands for. It lives until its handle is closed and the last call left

@@ -105,6 +105,27 @@ Outcome<void> PublishedService::wait_for_subscribers(std::size_t count, Timeout 
   return {};
 }
 
+Outcome<std::size_t> PublishedService::subscribers_changed(Timeout timeout) {
+  const std::int64_t deadline = deadline_after(timeout);
+  const MutexLock lock(mutex_);
+  while (!has_news()) {
+    if (is_over(deadline)) {
+      return Failure{Status::timeout,
+                     full_name_ + " still has " + std::to_string(subscribers_) + " subscribers"};
+    }
+    static_cast<void>(changed_.wait_until(mutex_, deadline));
+  }
+  if (end_) return end_.failure("wait for subscribers of " + full_name_);
+  told_subscribers_ = subscribers_;
+  source_.update(false);
+  return subscribers_;
+}
+
+void PublishedService::visit(const SourceVisitor& visitor) {
+  const MutexLock lock(mutex_);
+  visitor(source_, has_news());
+}
+
 std::uint64_t PublishedService::published() {
   const MutexLock lock(mutex_);
   return published_;
@@ -150,6 +171,7 @@ void PublishedService::on_subscribers(std::size_t count) {
   subscribers_ = count;
   subscribers_known_ = true;
   changed_.notify_all();
+  source_.update(has_news());
 }
 
 void PublishedService::on_renamed(const std::string& own_name) {
@@ -166,6 +188,7 @@ void PublishedService::end(const Ending& ending) {
   const MutexLock lock(mutex_);
   end_ = ending;
   changed_.notify_all();
+  source_.update(true);
 }
 
 Share Subscriber::share() const {

@@ -16,6 +16,7 @@
 #include "client/gimi/received_streams.hpp"
 #include "client/gimi/send_stream.hpp"
 #include "client/gimi/uplink.hpp"
+#include "client/gimi/wait_set.hpp"
 #include "gimnet/gimi/handles.hpp"
 #include "gimnet/gimi/options.hpp"
 #include "gimnet/gimi/outcome.hpp"
@@ -41,6 +42,10 @@ class PublishedService {
   [[nodiscard]] std::size_t subscribers() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] Outcome<void> wait_for_subscribers(std::size_t count, Timeout timeout)
       GIMNET_EXCLUDES(mutex_);
+  /// Waits until their number is another one than this told last; it tells at once at first.
+  [[nodiscard]] Outcome<std::size_t> subscribers_changed(Timeout timeout) GIMNET_EXCLUDES(mutex_);
+  /// A WaitSet waits for what subscribers_changed() tells.
+  void visit(const SourceVisitor& visitor) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::uint64_t published() GIMNET_EXCLUDES(mutex_);
   /// Dropped, since the hub was away.
   [[nodiscard]] std::uint64_t unsent() GIMNET_EXCLUDES(mutex_);
@@ -65,6 +70,10 @@ class PublishedService {
  private:
   /// REQUIRES: the hub refuses it.
   [[nodiscard]] Failure refusal(std::string_view doing) const GIMNET_REQUIRES(mutex_);
+  /// subscribers_changed() would answer at once.
+  [[nodiscard]] bool has_news() const GIMNET_REQUIRES(mutex_) {
+    return told_subscribers_ != subscribers_ || end_;
+  }
 
   Uplink& uplink_;
   const std::string name_;
@@ -78,6 +87,9 @@ class PublishedService {
   Failure refusal_ GIMNET_GUARDED_BY(mutex_){Status::refused, ""};  ///< while it has no group
   std::size_t subscribers_ GIMNET_GUARDED_BY(mutex_) = 0;
   bool subscribers_known_ GIMNET_GUARDED_BY(mutex_) = true;
+  std::optional<std::size_t> told_subscribers_
+      GIMNET_GUARDED_BY(mutex_);  ///< by subscribers_changed(), last
+  WaitSource source_ GIMNET_GUARDED_BY(mutex_);
   std::uint32_t sequence_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::uint64_t published_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::uint64_t unsent_ GIMNET_GUARDED_BY(mutex_) = 0;

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 #include <poll.h>
 
+#include <cstddef>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -72,6 +74,39 @@ TEST_F(ExecutorTest, AWaitSetTellsOfEachKindOfMember) {
   EXPECT_EQ(set_.wait(kWait).or_throw(), Users{6});
   EXPECT_EQ(viewer_.receive(kNoWait)->text(), "hello");
   EXPECT_TRUE(set_.wait(kNoWait).is(Status::timeout));
+}
+
+TEST_F(ExecutorTest, APublisherIsToldWhenItsSubscribersChange) {
+  const Publisher eye = robot_.advertise("eye").or_throw();
+  set_.add(eye, 1).or_throw();
+  EXPECT_EQ(set_.wait(kWait).or_throw(), Users{1}) << "at first";
+  EXPECT_EQ(eye.subscribers_changed(kNoWait).or_throw(), 0u);
+  EXPECT_TRUE(set_.wait(kNoWait).is(Status::timeout));
+  EXPECT_TRUE(eye.subscribers_changed(Timeout{1}).is(Status::timeout));
+  {
+    const auto seen = viewer_.subscribe("robot/eye").or_throw();
+    EXPECT_EQ(set_.wait(kWait).or_throw(), Users{1});
+    EXPECT_EQ(set_.wait(kWait).or_throw(), Users{1}) << "until it was asked";
+    EXPECT_EQ(eye.subscribers(), 1u);
+    EXPECT_EQ(eye.subscribers_changed(kNoWait).or_throw(), 1u);
+    EXPECT_TRUE(set_.wait(kNoWait).is(Status::timeout));
+  }
+  EXPECT_EQ(eye.subscribers_changed(kWait).or_throw(), 0u);
+  set_.remove(eye).or_throw();
+
+  std::vector<std::size_t> told;
+  std::optional<Subscription> seen;
+  executor_
+      .on(eye,
+          [&](std::size_t count) {
+            told.push_back(count);
+            if (count == 1) robot_.close();
+          })
+      .or_throw();
+  seen = viewer_.subscribe("robot/eye").or_throw();
+  executor_.run().or_throw();  // ends with what it waits for
+  EXPECT_EQ(told, std::vector<std::size_t>{1});
+  EXPECT_TRUE(eye.subscribers_changed(kNoWait).is(Status::closed));
 }
 
 TEST_F(ExecutorTest, AMemberIsInOneSetUntilItIsRemovedOrEnds) {

@@ -13,6 +13,7 @@ _Static_assert(sizeof(gimi_message) == 128, "gimi_message");
 _Static_assert(sizeof(gimi_batch) == 40, "gimi_batch");
 _Static_assert(sizeof(gimi_list) == 32, "gimi_list");
 _Static_assert(sizeof(gimi_watch_event) == 80, "gimi_watch_event");
+_Static_assert(sizeof(gimi_connection_event) == 1056, "gimi_connection_event");
 _Static_assert(sizeof(gimi_handle) == 8, "gimi_handle");
 _Static_assert(sizeof(gimi_status) == 4, "gimi_status");
 #endif

@@ -132,6 +132,7 @@ std::vector<GimiMisuse::Call> GimiMisuse::calls() {
   static gimi_reply reply;
   static gimi_request request;
   static gimi_watch_event event;
+  static gimi_connection_event connection{sizeof connection, 0, 0, 0, {}};
   static gimi_loaned loan;
   static gimi_ready ready;
   static std::size_t number;
@@ -149,6 +150,10 @@ std::vector<GimiMisuse::Call> GimiMisuse::calls() {
       {"accept", kNode, [](H h) { return gimi_accept(h, "a", nullptr, &made); }},
       {"sender", kNode, [](H h) { return gimi_sender(h, 1, nullptr, &made); }},
       {"watch", kNode, [](H h) { return gimi_watch(h, nullptr, 0, 0, &made); }},
+      {"watch_connection", kNode, [](H h) { return gimi_watch_connection(h, &made); }},
+      {"connection_receive", 0, [](H h) { return gimi_connection_receive(h, 0, &connection); }},
+      {"subscribers_changed", kPublisher,
+       [](H h) { return gimi_subscribers_changed(h, 0, &number); }},
       {"publish", kPublisher, [](H h) { return gimi_publish(h, "x", 1, 0, 0); }},
       {"loan", kPublisher, [](H h) { return gimi_loan(h, 1, &loan); }},
       {"send", kSender, [](H h) { return gimi_send(h, "x", 1, 0, 0); }},
@@ -225,6 +230,7 @@ TEST_F(GimiMisuse, PointersThatAreNullAreRefused) {
       [&] { return gimi_nodes(node_, nullptr, 0, nullptr); },
       [&] { return gimi_watch(node_, nullptr, 0, 0, nullptr); },
       [&] { return gimi_watch_receive(handles_[5], 0, nullptr); },
+      [&] { return gimi_subscribers_changed(handles_[1], 0, nullptr); },
       [&] { return gimi_ask(node_, "a/b", nullptr, nullptr, nullptr); },
       [&] { return gimi_ask(node_, nullptr, nullptr, nullptr, &reply); },
       [&] { return gimi_ask(node_, "a/b", &no_bytes, nullptr, &reply); },
@@ -245,6 +251,16 @@ TEST_F(GimiMisuse, PointersThatAreNullAreRefused) {
   gimi_request_release(nullptr);
   gimi_message_release(nullptr);
   gimi_loan_release(nullptr);
+}
+
+TEST_F(GimiMisuse, EventsOfAConnectionNeedAPlaceOfASize) {
+  gimi_connection_event unsized{};
+  gimi_handle connection = 0;
+  EXPECT_EQ(gimi_watch_connection(node_, nullptr), GIMI_BAD_ARGUMENT);
+  ASSERT_EQ(gimi_watch_connection(node_, &connection), GIMI_OK);
+  EXPECT_EQ(gimi_connection_receive(connection, 0, nullptr), GIMI_BAD_ARGUMENT);
+  EXPECT_EQ(gimi_connection_receive(connection, 0, &unsized), GIMI_BAD_ARGUMENT);
+  EXPECT_EQ(gimi_close(connection), GIMI_OK);
 }
 
 template <class Options, class Call>

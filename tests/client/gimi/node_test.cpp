@@ -45,13 +45,19 @@ TEST_F(NodeTest, TellsWhatBecomesOfItsConnectionIfAskedTo) {
   ASSERT_EQ(::setenv("GIMNET_LOG", "info", 1), 0);
   testing::internal::CaptureStderr();
   const Node node = Node::join({.name = "robot", .hub = hub_.url(), .reconnect = false}).or_throw();
+  const ConnectionWatch connection = node.watch_connection().or_throw();
+  EXPECT_EQ(connection.receive(kWait)->change, ConnectionChange::connected);
   hub_.kill();
   EXPECT_FALSE(node.receive(kWait));
+  const ConnectionEvent ended = connection.receive(kWait).or_throw();
+  EXPECT_EQ(ended.change, ConnectionChange::ended);
+  EXPECT_TRUE(connection.receive(kWait).is(Status::not_connected));
   ASSERT_EQ(::unsetenv("GIMNET_LOG"), 0);
   const std::string told = testing::internal::GetCapturedStderr();
   EXPECT_NE(told.find("gimnet: robot: connected to the hub "), std::string::npos) << told;
   EXPECT_NE(told.find("gimnet: robot: no connection will come any more: "), std::string::npos)
       << told;
+  EXPECT_NE(told.find("gimnet: robot: " + ended.why), std::string::npos) << told;
 }
 
 // Signals belong to the program, which may wait for them with sigwait() in a thread of its own.
@@ -369,6 +375,25 @@ TEST_F(NodeTest, TellsWhenTheHubIsGone) {
   EXPECT_TRUE(eventually([&] { return !node.state().connected; }));
   EXPECT_FALSE(node.state().trouble.empty());
   EXPECT_TRUE(stream.send("x", Timeout{1}).is(Status::not_connected));
+}
+
+TEST_F(NodeTest, TellsTheEventsOfItsConnectionWithTheirCauses) {
+  const Node node = join("robot");
+  const ConnectionWatch connection = node.watch_connection().or_throw();
+  const WaitSet set;
+  set.add(connection, 1).or_throw();
+  ASSERT_TRUE(set.wait(kWait));
+  EXPECT_EQ(connection.receive(kNoWait)->change, ConnectionChange::connected);
+  EXPECT_TRUE(set.wait(kNoWait).is(Status::timeout));
+  hub_.kill();
+  ASSERT_TRUE(set.wait(kWait));
+  const ConnectionEvent lost = connection.receive(kNoWait).or_throw();
+  EXPECT_EQ(lost.change, ConnectionChange::lost);
+  EXPECT_EQ(lost.why, "lost the connection to the hub: " + node.state().trouble);
+  const HubProcess again({"--shards", "2", "--listen", hub_.url()});
+  const ConnectionEvent back = connection.receive(kWait).or_throw();
+  EXPECT_EQ(back.change, ConnectionChange::connected_anew) << "another hub keeps no session";
+  EXPECT_TRUE(back.is_connected());
 }
 
 }  // namespace
