@@ -18,7 +18,8 @@ enum {
   GIMI_PLAIN = 0x02,
   /** Published with GIMI_LATEST: gaps in `sequence` are what was skipped for newer ones. */
   GIMI_OF_LATEST = 0x04,
-  GIMI_STAMPED = 0x08 /**< `sent_ns` is set. */
+  GIMI_STAMPED = 0x08, /**< `sent_ns` is set. */
+  GIMI_AGED = 0x10     /**< gimi_message_age() knows its age. */
 };
 
 /** The content of a message. Numbers from 64 belong to applications. */
@@ -48,16 +49,26 @@ typedef struct gimi_message {
   uint32_t reconnects; /**< gimi_node_state.reconnects when it came. */
   gimi_lane lane;
   uint32_t flags;
-  uint32_t content;    /**< GIMI_CONTENT_*. */
-  uint32_t counted[2]; /**< The library's. */
-  void* storage;       /**< The library's. */
-  void* name_storage;  /**< The library's. */
-  uint64_t reserved[3];
+  uint32_t content;      /**< GIMI_CONTENT_*. */
+  uint32_t counted[2];   /**< The library's. */
+  void* storage;         /**< The library's. */
+  void* name_storage;    /**< The library's. */
+  int64_t born_ns;       /**< The library's. */
+  int64_t born_error_ns; /**< The library's. */
+  uint64_t reserved[1];
 } gimi_message;
 
 /** Gives the memory back and empties the struct; does nothing with an empty one. NULL is ignored.
  */
 GIMNET_API void gimi_message_release(gimi_message* message);
+
+/** Stores how long ago a message was sent, in ns, by the clocks of the hubs, and the error that
+ * this node's part has: half of its shortest round trip to its hub. Where the clock of the sender's
+ * machine stands does not matter. The sender has a part like that, and each link. Either pointer
+ * may be NULL. GIMI_NOT_FOUND: not known. It is known of messages with age_ms_max
+ * (gimi_publish_options, gimi_send_options), once the hub has answered a PING. */
+GIMNET_API gimi_status gimi_message_age(const gimi_message* message, int64_t* age_ns,
+                                        int64_t* error_ns);
 
 /** Memory of the library for a message that is to be published. The program fills it, and may make
  * size smaller. */

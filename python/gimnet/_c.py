@@ -114,7 +114,7 @@ class gimi_message(ctypes.Structure):
                 ("sent_ns", c_int64), ("arrival_ns", c_int64), ("key", gimi_key), ("from", c_uint32),
                 ("sequence", c_uint32), ("reconnects", c_uint32), ("lane", c_int32), ("flags", c_uint32),
                 ("content", c_uint32), ("counted", c_uint32 * 2), ("storage", c_void_p), ("name_storage", c_void_p),
-                ("reserved", c_uint64 * 3)]
+                ("born_ns", c_int64), ("born_error_ns", c_int64), ("reserved", c_uint64 * 1)]
 
 
 class gimi_batch(ctypes.Structure):

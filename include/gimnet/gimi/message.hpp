@@ -89,6 +89,13 @@ class BytesView {
   std::size_t size_ = 0;
 };
 
+/// The age of a message, in ns. `error_ns` is this node's part of the error: half of its shortest
+/// round trip to its hub. The sender has a part like that, and each link.
+struct MessageAge {
+  std::int64_t age_ns = 0;
+  std::int64_t error_ns = 0;
+};
+
 /// A message that was received. Owns its bytes, which stay where the network put them; it may share
 /// a block of 256 KiB with its neighbours, so a program that keeps few of many for long copies
 /// those. Thread safety: a value that can be moved; one thread at a time. Lifetime: may outlive the
@@ -140,6 +147,14 @@ class Message {
   /// When it was sent, by the sender's clock in ns since 1970, if the sender stamped it.
   [[nodiscard]] std::optional<std::int64_t> sent_ns() const {
     return has(GIMI_STAMPED) ? std::optional(message_.sent_ns) : std::nullopt;
+  }
+  /// The time since it was sent, by the clocks of the hubs, if it was sent with an age limit
+  /// (PublishOptions::age_ms_max). Nothing: not known (gimi_message_age()).
+  [[nodiscard]] std::optional<MessageAge> age() const {
+    if (!has(GIMI_AGED)) return std::nullopt;
+    MessageAge age;
+    static_cast<void>(gimi_message_age(&message_, &age.age_ns, &age.error_ns));
+    return age;
   }
   /// When it was read from the network, by this machine's clock in ns since 1970.
   [[nodiscard]] std::int64_t arrival_ns() const { return message_.arrival_ns; }

@@ -1,6 +1,10 @@
 #include "client/gimi/message.hpp"
 
+#include <algorithm>
 #include <utility>
+
+#include "base/clock.hpp"
+#include "client/gimi/failure.hpp"
 
 namespace gimnet::gimi {
 
@@ -43,6 +47,14 @@ Message make_plain_message(const nif_incoming& in, std::span<const std::byte> da
   return Message(message);
 }
 
+Message born_at(Message message, std::int64_t steady_ns, std::int64_t error_ns) {
+  gimi_message aged = message.give_up();
+  aged.flags |= GIMI_AGED;
+  aged.born_ns = steady_ns;
+  aged.born_error_ns = error_ns;
+  return Message(aged);
+}
+
 Message begin_stream(Message message) {
   gimi_message begins = message.give_up();
   begins.flags |= GIMI_BEGINS_STREAM;
@@ -71,10 +83,32 @@ void disown(Message message) {
 
 }  // namespace gimnet::gimi
 
-extern "C" void gimi_message_release(gimi_message* message) {
+extern "C" {
+
+gimi_status gimi_message_age(const gimi_message* message, int64_t* age_ns, int64_t* error_ns) {
+  using gimnet::gimi::fail;
+  if (age_ns != nullptr) *age_ns = 0;
+  if (error_ns != nullptr) *error_ns = 0;
+  if (message == nullptr) return fail(GIMI_BAD_ARGUMENT, "gimi_message_age(): message is NULL");
+  if ((message->flags & GIMI_AGED) == 0) {
+    return fail(GIMI_NOT_FOUND,
+                "the age of the message is not known: it was sent without age_ms_max, or the hub "
+                "has not answered a PING yet");
+  }
+  // The sender may be wrong by more than its message is old. Unsigned: it may say anything.
+  const auto age = static_cast<std::int64_t>(static_cast<std::uint64_t>(gimnet::steady_now_ns()) -
+                                             static_cast<std::uint64_t>(message->born_ns));
+  if (age_ns != nullptr) *age_ns = std::max<std::int64_t>(age, 0);
+  if (error_ns != nullptr) *error_ns = message->born_error_ns;
+  return GIMI_OK;
+}
+
+void gimi_message_release(gimi_message* message) {
   if (message == nullptr) return;
   for (void* storage : {message->storage, message->name_storage}) {
     if (storage != nullptr) static_cast<gimnet::nif::Storage*>(storage)->release();
   }
   *message = {};
 }
+
+}  // extern "C"

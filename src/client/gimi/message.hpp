@@ -30,6 +30,8 @@ using OwnedServiceName = std::unique_ptr<ServiceName, ReleaseServiceName>;
 /// The same of bytes without a GIMI header.
 [[nodiscard]] Message make_plain_message(const nif_incoming& in, std::span<const std::byte> data,
                                          ServiceName* service, std::uint32_t reconnects);
+/// The message, which was sent at that moment of the steady clock, give or take the error.
+[[nodiscard]] Message born_at(Message message, std::int64_t steady_ns, std::int64_t error_ns);
 /// The message, whose sender began the stream anew.
 [[nodiscard]] Message begin_stream(Message message);
 /// The same message once more: both keep its bytes.

@@ -130,7 +130,7 @@ nif_verdict Reception::on_data(const nif_incoming& in, const proto::gimi::Messag
   StreamEpochs& epochs = received_.find({name.peer, in.kind, name.group, name.key});
   const StreamEpochs::Step step = epochs.look(view.header.epoch);
   if (step == StreamEpochs::Step::former) return drop_outdated();
-  Message message = make_message(in, view, nullptr, reconnects_);
+  Message message = with_age(make_message(in, view, nullptr, reconnects_), in);
   if (step == StreamEpochs::Step::begins) message = begin_stream(std::move(message));
   AckReceipt receipt(clerk_, name, static_cast<Lane>(in.lane), view.header);
   const bool wanted = is_for_one(in) && view.header.has(proto::gimi::kFlagAckWanted);
@@ -169,6 +169,14 @@ nif_verdict Reception::put(SubscribedService& service,
   return put == SubscribedService::Put::no_room ? NIF_NOT_NOW : NIF_DONE;
 }
 
+Message Reception::with_age(Message message, const nif_incoming& in) const {
+  if (in.extensions_size == 0) return message;
+  const auto age = proto::find_age(extensions_of(in));
+  const auto born = age ? uplink_.own_time(age->origin_ns) : std::nullopt;
+  if (!born) return message;
+  return born_at(std::move(message), born->steady_ns, born->error_ns);
+}
+
 nif_verdict Reception::drop_outdated() {
   losses_.add_outdated();
   return NIF_DONE;
@@ -183,7 +191,7 @@ nif_verdict Reception::on_group_data(const nif_incoming& in, const proto::gimi::
                                              view.header.sequence};
   const StreamEpochs::Step step = service->look(position);
   if (step == StreamEpochs::Step::former) return drop_outdated();
-  Message message = make_message(in, view, &service->shared_name(), reconnects_);
+  Message message = with_age(make_message(in, view, &service->shared_name(), reconnects_), in);
   if (step == StreamEpochs::Step::begins) message = begin_stream(std::move(message));
   return put(*service, position, std::move(message));
 }

@@ -73,6 +73,8 @@ class Reception {
   [[nodiscard]] nif_verdict put(SubscribedService& service,
                                 const std::optional<SubscribedService::Position>& position,
                                 Message message);
+  /// The message, which tells its age if it came with one and the hub's clock is known.
+  [[nodiscard]] Message with_age(Message message, const nif_incoming& in) const;
   /// Of a stream that its sender has begun anew since.
   [[nodiscard]] nif_verdict drop_outdated();
   /// A message that is larger than this node takes: its sender is told.

@@ -117,6 +117,11 @@ void Uplink::deliver() const {
   if (nif::Node* const direct = direct_.load()) direct->deliver_again();
 }
 
+std::optional<nif::HubClock::OwnTime> Uplink::own_time(std::int64_t hub_ns) const {
+  nif::Node* const direct = direct_.load();
+  return direct == nullptr ? std::nullopt : direct->clock().own_time(hub_ns);
+}
+
 std::string Uplink::trouble() const {
   std::string words(NIF_SENTENCE_BYTES_MAX, '\0');
   // It may be another, longer one by now.

@@ -8,6 +8,7 @@
 
 #include "base/ids.hpp"
 #include "client/gimi/message_queue.hpp"
+#include "client/nif/hub_clock.hpp"
 #include "client/nif/platform.hpp"
 #include "gimnet/gimi/message.hpp"
 #include "gimnet/gimi/outcome.hpp"
@@ -76,6 +77,9 @@ class Uplink {
   /// As nif_credit() and nif_deliver().
   void credit(const TakenMessages& taken, bool more) const;
   void deliver() const;
+
+  /// As HubClock::own_time().
+  [[nodiscard]] std::optional<nif::HubClock::OwnTime> own_time(std::int64_t hub_ns) const;
 
   /// nif_last_error(), whole.
   [[nodiscard]] std::string trouble() const;

@@ -66,6 +66,13 @@ std::optional<std::int64_t> HubClock::hub_time(std::int64_t steady_ns) {
   return sum(steady_ns, *steady_offset_ns_);
 }
 
+std::optional<HubClock::OwnTime> HubClock::own_time(std::int64_t hub_ns) {
+  const MutexLock lock(mutex_);
+  if (measured_ == 0) return std::nullopt;
+  const Measurement& measured = shortest();
+  return OwnTime{difference(hub_ns, measured.steady_offset_ns), measured.round_trip_ns / 2};
+}
+
 void HubClock::clear() {
   const MutexLock lock(mutex_);
   under_way_.clear();

@@ -34,6 +34,13 @@ class HubClock {
   /// the last hub had it. Nothing: no hub has told its time yet.
   [[nodiscard]] std::optional<std::int64_t> hub_time(std::int64_t steady_ns)
       GIMNET_EXCLUDES(mutex_);
+  struct OwnTime {
+    std::int64_t steady_ns = 0;
+    std::int64_t error_ns = 0;  ///< half of the shortest round trip
+  };
+  /// The moment of this process's steady clock at which it was `hub_ns` at the hub. Nothing: no
+  /// PONG came yet.
+  [[nodiscard]] std::optional<OwnTime> own_time(std::int64_t hub_ns) GIMNET_EXCLUDES(mutex_);
   /// The connection broke: what is under way will not be answered, and the next hub may have
   /// another clock.
   void clear() GIMNET_EXCLUDES(mutex_);

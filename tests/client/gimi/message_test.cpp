@@ -3,6 +3,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/clock.hpp"
 #include "client/gimi/message.hpp"
 #include "gimnet/gimi/message.hpp"
 #include "tests/client/gimi/support/made_message.hpp"
@@ -55,6 +56,26 @@ TEST(Message, ItsMemoryIsGivenBackOnce) {
   gimi_message_release(nullptr);
   EXPECT_TRUE(storage->is_only_reference());
   storage->release();
+}
+
+TEST(Message, TellsItsAgeIfThatIsKnown) {
+  Message message = test::make_message("x");
+  EXPECT_FALSE(message.age());
+  std::int64_t age_ns = 7;
+  EXPECT_EQ(gimi_message_age(&message.c_message(), &age_ns, nullptr), GIMI_NOT_FOUND);
+  EXPECT_EQ(age_ns, 0);
+  EXPECT_EQ(gimi_message_age(nullptr, &age_ns, nullptr), GIMI_BAD_ARGUMENT);
+  constexpr std::int64_t kBefore = 1'000'000'000;
+  const std::int64_t then = steady_now_ns();
+  message = gimi::born_at(std::move(message), then - kBefore, 30);
+  const auto age = message.age();
+  ASSERT_TRUE(age);
+  EXPECT_GE(age->age_ns, kBefore);
+  EXPECT_LE(age->age_ns, kBefore + steady_now_ns() - then);
+  EXPECT_EQ(age->error_ns, 30);
+  EXPECT_EQ(gimi_message_age(&message.c_message(), nullptr, nullptr), GIMI_OK);
+  message = gimi::born_at(std::move(message), then + 60 * kBefore, 30);
+  EXPECT_EQ(message.age()->age_ns, 0) << "a clock is wrong by more than its age";
 }
 
 TEST(BytesView, LooksAtAnyBytes) {

@@ -8,6 +8,7 @@
 #include <thread>
 #include <vector>
 
+#include "base/clock.hpp"
 #include "gimnet/gimi.hpp"
 #include "proto/control/ns.hpp"
 #include "proto/frame/extensions.hpp"
@@ -197,6 +198,25 @@ TEST_F(Wishes, TheLastMessageIsForEachThatSubscribesLaterAndForNobodyTwice) {
   EXPECT_EQ(second.receive(kWait)->text(), "2");
   EXPECT_EQ(first.receive(kWait)->text(), "2") << "the first message came once";
   EXPECT_EQ(first.missed() + second.missed(), 0u);
+}
+
+TEST_F(Wishes, OneWithAnAgeLimitTellsTheAgeOfItsMessages) {
+  publisher_ = robot_.advertise("eye", {.age_ms_max = UINT32_MAX}).or_throw();
+  const Subscription seen = subscribe({});
+  const auto is_measured = [](const Node& node) { return node.state().hub_round_trip_ns != 0; };
+  ASSERT_TRUE(eventually([&] { return is_measured(robot_) && is_measured(viewer_); }));
+  publish(1);
+  const std::int64_t published_ns = wall_now_ns();
+  const Message message = seen.receive(kWait).or_throw();
+  const std::int64_t before_ns = wall_now_ns();
+  const auto age = message.age();
+  const std::int64_t after_ns = wall_now_ns();
+  ASSERT_TRUE(age);
+  EXPECT_GT(age->error_ns, 0);
+  // Both ends have the clock of this machine, and know the hub's to half of a round trip.
+  const std::int64_t error_ns = age->error_ns + robot_.state().hub_round_trip_ns;
+  EXPECT_GE(age->age_ns, before_ns - published_ns - error_ns);
+  EXPECT_LE(age->age_ns, after_ns - *message.sent_ns() + error_ns);
 }
 
 class PublishedServices : public gimi::test::Conversation {};

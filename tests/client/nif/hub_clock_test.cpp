@@ -38,6 +38,21 @@ TEST(HubClock, TellsTheHubsTimeByTheWelcomeAndThenByTheShortestRoundTrip) {
   EXPECT_EQ(clock.hub_time(3'050), 10) << "another hub";
 }
 
+TEST(HubClock, TellsWhenItWasAHubsTimeAndHowWellItKnows) {
+  HubClock clock;
+  clock.begin(50'000, 1'000);
+  EXPECT_FALSE(clock.own_time(50'000)) << "nobody knows how old the WELCOME was";
+  const auto ping = clock.ping(2'000, 9);
+  clock.on_pong({ping.sequence, 9, 70'050}, 2'100);
+  const auto known = clock.own_time(70'000);
+  ASSERT_TRUE(known);
+  EXPECT_EQ(known->steady_ns, 2'000);
+  EXPECT_EQ(known->error_ns, 50);
+  EXPECT_TRUE(clock.own_time(INT64_MIN)) << "other nodes may say anything";
+  clock.clear();
+  EXPECT_FALSE(clock.own_time(70'000));
+}
+
 TEST(HubClock, FollowsAClockThatWasSet) {
   HubClock clock;
   const auto measure = [&clock](std::int64_t steady_ns, std::int64_t wall_ns, std::int64_t hub_ns,
