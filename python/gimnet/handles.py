@@ -194,7 +194,6 @@ class Waitable(Blocking):
         super().__init__(handle, kept)
         self._set: Optional[RawSet] = None  # of this handle alone, once a thread waits
         self.shared = False  # the program waits by a descriptor or a WaitSet: nothing is fetched ahead
-        self.poll_ms = TIMEOUT_MS_MAX  # the library is asked so often, also if nothing comes
 
     @property
     def number(self) -> int:
@@ -253,7 +252,7 @@ class Waitable(Blocking):
             return status
         end = end_of(timeout)
         while status == _c.GIMI_TIMEOUT:
-            left = left_ms(end, self.poll_ms)
+            left = left_ms(end, TIMEOUT_MS_MAX)
             if left <= 0:
                 break
             own = self.own_set()

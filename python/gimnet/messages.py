@@ -8,7 +8,7 @@ import weakref
 from dataclasses import dataclass
 from typing import Any, Dict, List, Mapping, Optional, Tuple
 
-from . import _c, bitestream
+from . import _c, bitestream, errors
 
 __all__ = ["Event", "Message", "NodeRecord", "Peer", "ServiceRecord"]
 
@@ -30,7 +30,7 @@ class Message:
     library's memory, which lives as long as any view of it. Times are in seconds since 1970.
     """
 
-    __slots__ = ("arrival", "begins_stream", "data", "key", "plain", "sender", "sent", "sequence", "service")
+    __slots__ = ("arrival", "begins_stream", "data", "key", "lane", "plain", "sender", "sent", "sequence", "service")
 
     def __init__(self, raw: Any, data: memoryview) -> None:
         self.data = data
@@ -41,6 +41,7 @@ class Message:
         self.key: Tuple[int, int] = (raw.key.type, raw.key.instance)
         self.sent: Optional[float] = raw.sent_ns / 1e9 if raw.flags & _c.GIMI_STAMPED else None
         self.arrival: float = raw.arrival_ns / 1e9
+        self.lane = LANE_NAMES.get(raw.lane, f"unknown {raw.lane}")
         self.begins_stream = bool(raw.flags & _c.GIMI_BEGINS_STREAM)
         self.plain = bool(raw.flags & _c.GIMI_PLAIN)
 
@@ -163,6 +164,16 @@ class NodeRecord:
 LANES = {"real_time": _c.GIMI_LANE_REAL_TIME, "normal": _c.GIMI_LANE_NORMAL, "bulk": _c.GIMI_LANE_BULK,
          "background": _c.GIMI_LANE_BACKGROUND}
 DELIVERIES = {"stream": _c.GIMI_STREAM, "latest": _c.GIMI_LATEST, "sync": _c.GIMI_SYNC}
+
+
+def chosen(what: str, words: Mapping[str, int], word: str) -> int:
+    """The number of that word. BadArgument names those that there are."""
+    if word not in words:
+        raise errors.BadArgument(f"there is no {what} {word!r}: use {', '.join(words)}")
+    return words[word]
+
+
+LANE_NAMES = {number: name for name, number in LANES.items()}
 _DELIVERY_NAMES = {number: name for name, number in DELIVERIES.items()}
 
 

@@ -164,7 +164,7 @@ class Node(Waitable):
 
     def __init__(self, handle: int) -> None:
         super().__init__(handle)
-        self._senders: Dict[Union[str, Peer], int] = {}
+        self._senders: Dict[Tuple[Union[str, Peer], str], int] = {}
         self._lock = threading.Lock()  # guards _senders
         Exit.add(handle, self)
 
@@ -208,12 +208,9 @@ class Node(Waitable):
         messages that a subscriber has not taken. `age_max`: dropped on the way when older. `lane`:
         real_time, normal, bulk or background; a lower one goes first. BadName, Taken, Denied (a node without a
         name)."""
-        if delivery not in messages.DELIVERIES:
-            raise errors.BadArgument(f"there is no delivery {delivery!r}: use {', '.join(messages.DELIVERIES)}")
-        if lane not in messages.LANES:
-            raise errors.BadArgument(f"there is no lane {lane!r}: use {', '.join(messages.LANES)}")
-        options = sized(_c.gimi_publish_options, key=to_key(key), delivery=messages.DELIVERIES[delivery], window=window,
-                         lane=messages.LANES[lane], retain=retain, metadata=to_text(metadata), timeout_ms=to_ms(timeout),
+        options = sized(_c.gimi_publish_options, key=to_key(key), window=window,
+                         delivery=messages.chosen("delivery", messages.DELIVERIES, delivery),
+                         lane=messages.chosen("lane", messages.LANES, lane), retain=retain, metadata=to_text(metadata), timeout_ms=to_ms(timeout),
                          age_ms_max=to_ms(age_max) if age_max else 0)
         return Publisher(self, self._opened(_c.lib.gimi_advertise, to_text(name), options))
 
@@ -226,10 +223,7 @@ class Node(Waitable):
         options = sized(_c.gimi_subscribe_options, rate_hz=rate_hz, queue=queue, timeout_ms=to_ms(timeout),
                          newest_only=newest_only, silence_ms=to_ms(silence) if silence else 0, window=window,
                          depth=depth)
-        made = Source(self, self._opened(_c.lib.gimi_subscribe, to_text(full_name), options))
-        if silence:
-            made.poll_ms = max(1, to_ms(silence) // 4)
-        return made
+        return Source(self, self._opened(_c.lib.gimi_subscribe, to_text(full_name), options))
 
     def accept(self, name: str, *, queue: int = 0, key: Tuple[int, int] = (0, 0), metadata: str = "",
                timeout: float = 5.0) -> Source:
@@ -238,39 +232,44 @@ class Node(Waitable):
                          timeout_ms=to_ms(timeout))
         return Source(self, self._opened(_c.lib.gimi_accept, to_text(name), options), kept=True)
 
-    def send(self, to: Union[str, Peer], value: Any, timeout: float = 1.0) -> None:
-        """Sends to the service of that full name, or to a Peer of find(). NotFound, Timeout (not sent),
-        NotConnected, NotDelivered."""
-        sender = self._sender(to, timeout)
+    def send(self, to: Union[str, Peer], value: Any, timeout: float = 1.0, *, lane: str = "normal") -> None:
+        """Sends to the service of that full name, or to a Peer of find(). `lane`: as of advertise(), and
+        the same each time. NotFound, Timeout (not sent), NotConnected, NotDelivered, BadArgument."""
+        sender = self._sender(to, lane, timeout)
         data, size, keeps = messages.payload(value)
         status = in_pieces(timeout, lambda ms: _c.lib.gimi_send(sender, data, size, ms, 0))
         del keeps
         self.check(status)
 
-    def _sender(self, to: Union[str, Peer], timeout: float) -> int:
+    def _sender(self, to: Union[str, Peer], lane: str, timeout: float) -> int:
         with self._lock:
-            if to not in self._senders:
-                self._senders[to] = (self._opened(_c.lib.gimi_sender, to, None) if isinstance(to, Peer) else
-                                     self._opened(_c.lib.gimi_sender_to_service, to_text(to), None, to_ms(timeout)))
-            return self._senders[to]
+            if (to, lane) not in self._senders:
+                options = sized(_c.gimi_send_options, lane=messages.chosen("lane", messages.LANES, lane))
+                self._senders[to, lane] = (
+                    self._opened(_c.lib.gimi_sender, to, options) if isinstance(to, Peer) else
+                    self._opened(_c.lib.gimi_sender_to_service, to_text(to), options, to_ms(timeout)))
+            return self._senders[to, lane]
 
     def answer(self, name: str, *, metadata: str = "", timeout: float = 5.0) -> Answers:
         """Answers the questions that others ask `own name/name`, until close() or the end of the node."""
         options = sized(_c.gimi_answer_options, metadata=to_text(metadata), timeout_ms=to_ms(timeout))
         return Answers(self, self._opened(_c.lib.gimi_answer, to_text(name), options))
 
-    def request(self, service: str, value: Any, timeout: float = 5.0, *, repeat: bool = False) -> Reply:
+    def request(self, service: str, value: Any, timeout: float = 5.0, *, repeat: bool = False, lane: str = "normal") -> Reply:
         """Asks whoever answers the service, and waits for the end of the request, of which there is exactly
         one. Failed (the other's own error), NotFound, Busy, Gone, Timeout, NotDelivered ...: `ran` of the
-        exception says whether the work may have been done. `repeat`: it may be done twice."""
-        with self.request_later(service, value, timeout, repeat=repeat) as pending:
+        exception says whether the work may have been done. `repeat`: it may be done twice. `lane`: of it and its
+        answer."""
+        with self.request_later(service, value, timeout, repeat=repeat, lane=lane) as pending:
             return pending.receive()
 
-    def request_later(self, service: str, value: Any, timeout: float = 5.0, *, repeat: bool = False) -> Pending:
+    def request_later(self, service: str, value: Any, timeout: float = 5.0, *, repeat: bool = False,
+                      lane: str = "normal") -> Pending:
         """Asks and does not wait. `timeout` ends the request; close() cancels it."""
         data, size, keeps = messages.payload(value)
         block = _c.gimi_bytes(ctypes.cast(data, ctypes.c_void_p), size)
-        options = sized(_c.gimi_request_options, timeout_ms=to_ms(timeout), repeat=repeat)
+        options = sized(_c.gimi_request_options, timeout_ms=to_ms(timeout), repeat=repeat,
+                        lane=messages.chosen("lane", messages.LANES, lane))
         try:
             return Pending(self, self._opened(_c.lib.gimi_ask_later, to_text(service), block, options))
         except errors.GimnetError as error:

@@ -68,11 +68,15 @@ class Nodes(TwoNodes):
 
     def test_sends_commands_to_a_service_and_to_a_peer(self):
         drive = self.robot.accept("drive")
-        self.viewer.send("robot/drive", {"v": 0.5})
-        self.assertEqual(drive.receive(PATIENCE_S).value, {"v": 0.5})
-        self.viewer.send(self.viewer.find("robot"), "hello")
+        for _ in range(2):
+            self.viewer.send("robot/drive", {"v": 0.5}, lane="real_time")
+            message = drive.receive(PATIENCE_S)
+            self.assertEqual((message.value, message.lane), ({"v": 0.5}, "real_time"))
+        with self.assertRaisesRegex(gimnet.BadArgument, "take the same ones"):
+            self.viewer.send("robot/drive", {"v": 0.5})
+        self.viewer.send(self.viewer.find("robot"), "hello", lane="bulk")
         message = self.robot.receive(PATIENCE_S)
-        self.assertEqual((message.text, message.service, str(message.sender)), ("hello", "", str(self.viewer.id)))
+        self.assertEqual((message.text, message.service, message.sender, message.lane), ("hello", "", self.viewer.id, "bulk"))
         with self.assertRaises(gimnet.NotFound):
             self.viewer.send("robot/nothing", "x")
 
@@ -87,7 +91,7 @@ class Nodes(TwoNodes):
 
         server = threading.Thread(target=lambda: collections.deque(map(handle, add), 0))
         server.start()
-        reply = self.viewer.request("robot/add", {"numbers": [1, 2]}, PATIENCE_S)
+        reply = self.viewer.request("robot/add", {"numbers": [1, 2]}, PATIENCE_S, lane="real_time")
         self.assertEqual((reply.value, reply.sender), ({"sum": 3}, self.robot.id))
         for question, wrong, ran, code in (({"fail": True}, gimnet.Failed, "yes", 7), ({"let go": True}, gimnet.Gone, "maybe", 0)):
             with self.assertRaises(wrong) as raised:
@@ -154,6 +158,8 @@ class Nodes(TwoNodes):
                             (gimnet.BadArgument, lambda: self.viewer.subscribe("robot/a", rate_hz=float("nan"))),
                             (gimnet.BadArgument, lambda: self.robot.advertise("a", delivery="often")),
                             (gimnet.BadArgument, lambda: self.robot.advertise("a", lane="fast")),
+                            (gimnet.BadArgument, lambda: self.robot.send("viewer/a", "x", lane="fast")),
+                            (gimnet.BadArgument, lambda: self.robot.request("viewer/a", "x", lane="fast")),
                             (gimnet.NotFound, lambda: self.viewer.find("nobody"))):
             with self.assertRaises(wrong) as raised:
                 call()
