@@ -20,7 +20,7 @@ PAGE = pathlib.Path(__file__).resolve().parent.parent / "docs" / "performance.md
 METRIC_TITLES = {CPU: "CPU, ns a message", "p50_us": "round trip, us", "p99_us": "99th percentile, us", "seconds": "seconds",
                  "rss_bytes_per_connection": "bytes a connection", "context_switches_per_second": "context switches/s"}
 COLOURS = {"null": "#888888", "tcphub": "#1f77b4", "tcphub_2_shards": "#17becf", "tcphub_spinning": "#9467bd",
-           "nats": "#2ca02c", "mosquitto": "#8c564b", "redis": "#d62728", "zeromq": "#ff7f0e"}
+           "nats": "#2ca02c", "mosquitto": "#8c564b", "cyclonedds": "#e377c2", "redis": "#d62728", "zeromq": "#ff7f0e"}
 PERCENTILES = (("p10_us", 0.1), ("p25_us", 0.25), ("p50_us", 0.5), ("p75_us", 0.75), ("p90_us", 0.9), ("p99_us", 0.99),
                ("p999_us", 0.999), ("max_us", 0.9999))
 

@@ -7,7 +7,7 @@ import statistics
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from driver.suite import NULL, NULL_TCP, SCENARIOS, UNIX, Case, decisive
+from driver.suite import BROKERS, CPU, NULL, NULL_TCP, SCENARIOS, UNIX, Case, decisive
 
 COUNTED = ("lost", "wrong", "dropped_frames", "ledger_gap")
 Index = dict[tuple[str, str, int, str], dict]
@@ -84,6 +84,7 @@ def add_derived(rows: list[dict]) -> None:
         add_seconds(row, index)
         add_idle_latency(row, index)
         add_libraries(row, rows)
+        add_beside(row, index)
 
 
 def add_null(row: dict, index: Index) -> None:
@@ -121,7 +122,16 @@ def add_libraries(row: dict, rows: list[dict]) -> None:
     for transport, suffix in (("tcp", ""), ("unix", UNIX)):
         if not suffix or row["transport"] == transport:
             add_best(row, [other for other in rows if other["scenario"] == row["scenario"] and other["size"] == row["size"]
-                           and other["transport"] == transport and other["subject"] != "tcphub"], suffix)
+                           and other["transport"] == transport and other["subject"] in BROKERS], suffix)
+
+
+def add_beside(row: dict, index: Index) -> None:
+    """Bursts beside those without a hub, and over a Unix socket beside those over TCP."""
+    if row["subject"] == "tcphub" and row["scenario"] == "library_burst":
+        for subject, name, metric in (("cyclonedds", "cpu_over_dds", CPU), ("tcphub", "rate_over_tcp", "messages_per_second")):
+            other = index.get((subject, row["scenario"], row["size"], "tcp"))
+            if other is not None and other is not row:
+                pair(row, other, name, lambda mine, theirs: ratio(mine, theirs, metric))
 
 
 def add_best(row: dict, rivals: list[dict], suffix: str) -> None:

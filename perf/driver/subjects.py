@@ -251,11 +251,26 @@ class Mosquitto(Rival):
         return f"{folder}/socket"
 
 
+class CycloneDds(Rival):
+    """Has no hub: a program that sleeps stands in its place."""
+
+    name = "cyclonedds"
+    program = "sleep"
+    package = "cyclonedds-dev"
+    transports = ("tcp",)
+
+    def command(self, folder: str) -> list[str]:
+        return [find_program(self.program), "infinity"]
+
+    def _await_ready(self) -> None:
+        self.urls = {"tcp": "tcp://127.0.0.1:0"}
+
+
 HUBS = {"tcphub": [], "tcphub_2_shards": ["--shards", "2"], "tcphub_spinning": ["--spin"]}
-RIVAL_CLASSES = {rival.name: rival for rival in (Nats, Mosquitto)}
-CLIENTS = {"tcphub": "library_client_nif", "nats": "library_client_nats", "mosquitto": "library_client_mosquitto"}
+RIVAL_CLASSES = {rival.name: rival for rival in (Nats, Mosquitto, CycloneDds)}
+CLIENTS = {name: f"library_client_{name}" for name in RIVAL_CLASSES} | {"tcphub": "library_client_nif"}
 SUBJECTS = ("null", *HUBS, *RIVAL_CLASSES)
-LIBRARY_PACKAGES = {"nats": "libnats-dev", "mosquitto": "libmosquitto-dev"}
+LIBRARY_PACKAGES = {"nats": "libnats-dev", "mosquitto": "libmosquitto-dev", "cyclonedds": "cyclonedds-dev"}
 
 
 def why_absent(name: str, case: Case, build: pathlib.Path) -> str | None:
@@ -267,6 +282,8 @@ def why_absent(name: str, case: Case, build: pathlib.Path) -> str | None:
         return "other hubs are measured by their libraries only"
     if case.transport not in rival.transports:
         return "it has no Unix socket"
+    if name == "cyclonedds" and case.scenario != "library_burst":
+        return "it is measured in bursts only"
     if name == "mosquitto" and case.scenario == "library_request":
         return "its library has no requests"
     if not (build / "bin" / CLIENTS[name]).exists():

@@ -25,8 +25,9 @@ class Scenario:
         return self.sizes if transport == "tcp" else self.unix_sizes
 
 
-# Other hubs, each measured by its own library.
-RIVALS = ("nats", "mosquitto")
+# Other hubs, each measured by its own library, and a library without a hub.
+BROKERS = ("nats", "mosquitto")
+RIVALS = (*BROKERS, "cyclonedds")
 WITH_LIBRARY = ("tcphub", *RIVALS)
 
 SCENARIOS = {
@@ -49,8 +50,8 @@ SCENARIOS = {
     "idle_alone": Scenario(relay_mode=None, metric="context_switches_per_second", unix_sizes=(), seconds_factor=6),
     "connect_10000": Scenario(metric="seconds", unix_sizes=()),
     # Longer, as the system's share of the time is only looked at at each tick of the kernel, 100 to 1,000 times a second.
-    "library_burst": Scenario(relay_mode=None, roles=("receiver", "sender"), sizes=(16, 1024), unix_sizes=(16, 1024),
-                              seconds_factor=2),
+    "library_burst": Scenario(relay_mode=None, roles=("receiver", "sender"), sizes=(16, 1024, 65536, 1048576),
+                              unix_sizes=(16, 1024, 65536, 1048576), seconds_factor=2),
     "library_round_trip": Scenario(relay_mode=None, metric="p50_us", roles=("echo", "pinger"), seconds_factor=2),
     "library_round_trip_one_cpu": Scenario(relay_mode=None, metric="p50_us", one_cpu=True, roles=("echo", "pinger"),
                                            seconds_factor=2),
@@ -280,6 +281,13 @@ GOALS = (
     Goal("library_burst", 16, "tcp", "system_over_best", None, 0.5),
     Goal("library_burst", 16, "unix", "system_over_best", None, 0.5),
     Goal("library_burst", 16, "unix", "system_over_best" + UNIX, None, 0.5),
+    Goal("library_burst", 16, "tcp", "cpu_over_best", None, 0.5),
+    Goal("library_burst", 16, "tcp", "cpu_over_dds", None, 0.25),
+    Goal("library_burst", 1024, "tcp", "cpu_over_dds", None, 0.5),
+    Goal("library_burst", 65536, "tcp", "cpu_over_dds", None, 1),
+    Goal("library_burst", 1048576, "tcp", "cpu_over_dds", None, 1),
+    Goal("library_burst", 65536, "unix", "rate_over_tcp", None, 1.3, at_least=True),
+    Goal("library_burst", 1048576, "unix", "rate_over_tcp", None, 1.3, at_least=True),
     Goal("library_round_trip", 16, "tcp", "rate_over_best", None, 1.1, at_least=True),
     Goal("library_round_trip", 16, "unix", "rate_over_best", None, 1.8, at_least=True),
     Goal("library_round_trip", 16, "unix", "rate_over_best" + UNIX, None, 1.8, at_least=True),
@@ -305,6 +313,9 @@ FIELD_TITLES = {
     "seconds_over_null": "seconds longer than the null relay",
     "request_over_plain": "times a plain round trip of the same run",
     "rate_over_best": "messages/s, times the best other library on TCP",
+    "cpu_over_best": "CPU a message, times the best other library on TCP",
+    "cpu_over_dds": "CPU a message, times Cyclone DDS",
+    "rate_over_tcp": "messages/s, times its own on TCP",
     "system_over_best": "system CPU a message, times the best other library on TCP",
     "rate_over_best" + UNIX: "messages/s, times the best other library on a Unix socket",
     "system_over_best" + UNIX: "system CPU a message, times the best other library on a Unix socket",

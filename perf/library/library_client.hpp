@@ -10,6 +10,8 @@
 #include <span>
 #include <string>
 
+#include "net/socket.hpp"
+
 namespace gimnet::perf {
 
 /// One program on a messaging library that talks with a partner, a program of the same kind,
@@ -25,7 +27,8 @@ class LibraryClient {
     std::string own;         ///< name under which this program is found
     std::string partner;     ///< name of the other one
     bool is_first = false;   ///< the partner starts later, and writes first
-    bool is_bursty = false;  ///< many messages one after the other are sent: gathering them pays
+    bool is_burst = false;   ///< bursts go from the one to the other
+    bool is_bursty = false;  ///< and this sends them: gathering them pays
   };
 
   LibraryClient() = default;
@@ -40,13 +43,13 @@ class LibraryClient {
 
   /// In place of open(): sends requests and plain messages of the partner back to it, each on a
   /// thread of the library or one of its own. When it returns both reach it.
-  virtual void answer(const Setup& setup) = 0;
+  virtual void answer(const Setup&) { fail(kNoRequests); }
   /// In place of open(): connects to a partner that answers.
-  virtual void begin_asking(const Setup& setup) = 0;
+  virtual void begin_asking(const Setup&) { fail(kNoRequests); }
   /// A request to the partner, and a plain message to it that it sends back. Both wait, and compare
   /// what comes with what went.
-  virtual void ask(std::span<const std::byte> payload) = 0;
-  virtual void send_round(std::span<const std::byte> payload) = 0;
+  virtual void ask(std::span<const std::byte>) { fail(kNoRequests); }
+  virtual void send_round(std::span<const std::byte>) { fail(kNoRequests); }
 
   /// Lets messages come until wake() was called since the last wait(), or the time is up (false).
   /// The main thread.
@@ -70,6 +73,8 @@ class LibraryClient {
   }
 
  private:
+  static constexpr const char* kNoRequests = "this library has no requests, or is not asked";
+
   std::mutex mutex_;
   std::condition_variable changed_;
   bool woken_ = false;

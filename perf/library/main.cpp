@@ -73,8 +73,9 @@ constexpr std::size_t kUnderWayBytesMax = 2 * 1024 * 1024;
 constexpr std::uint64_t kUnderWayMax = 16'384;
 /// The receiver tells after every so many of a full window what it has.
 constexpr std::uint64_t kReportsPerWindow = 8;
-/// Messages sent between two looks at the clock.
-constexpr std::uint64_t kBatch = 64;
+constexpr std::uint64_t kUnderWayMin = 4;
+/// Messages sent between two looks at the clock, at most.
+constexpr std::uint64_t kBatchMax = 64;
 constexpr std::chrono::milliseconds kAskAgain{200};
 constexpr StreamId kData = 1;
 constexpr StreamId kQuestion = 2;
@@ -82,7 +83,7 @@ constexpr StreamId kReport = 3;
 constexpr std::size_t kReportBytes = 24;
 
 std::uint64_t window_of(std::size_t payload_bytes) {
-  return std::clamp<std::uint64_t>(kUnderWayBytesMax / payload_bytes, kBatch, kUnderWayMax);
+  return std::clamp<std::uint64_t>(kUnderWayBytesMax / payload_bytes, kUnderWayMin, kUnderWayMax);
 }
 
 /// Sends numbered messages and knows what became of them.
@@ -98,12 +99,13 @@ class BurstSender {
 
   /// As fast as it goes.
   void run(std::chrono::nanoseconds duration) {
+    const std::uint64_t batch = std::min(kBatchMax, window_ / kUnderWayMin);
     for (const auto end = Clock::now() + duration; Clock::now() < end;) {
-      if (sent_ + kBatch - settled() > window_) {
+      if (sent_ + batch - settled() > window_) {
         if (!client_.wait(Clock::now() + kAskAgain)) settle();
         continue;
       }
-      for (std::uint64_t count = 0; count < kBatch; ++count) {
+      for (std::uint64_t count = 0; count < batch; ++count) {
         store_le(payload_.data(), make_stamp(kData, sent_++));
         client_.send(payload_);
       }
@@ -195,7 +197,8 @@ Findings send_bursts(LibraryClient& client, LibraryClient::Setup setup,
                                  const PairOptions& options) {
   Inbox inbox;
   inbox.expect(kData, options.payload_bytes);
-  const std::uint64_t report_every = window_of(options.payload_bytes) / kReportsPerWindow;
+  const std::uint64_t report_every =
+      std::max<std::uint64_t>(1, window_of(options.payload_bytes) / kReportsPerWindow);
   std::uint64_t next_report = report_every;
   const auto report = [&](bool is_answer) {
     std::array<std::byte, kReportBytes> message;
@@ -381,6 +384,7 @@ int main(int argc, char** argv) {
   options.duration = std::chrono::nanoseconds(static_cast<std::int64_t>(seconds * 1e9));
   options.patience = std::chrono::nanoseconds(static_cast<std::int64_t>(patience * 1e9));
   setup.is_first = role == "receiver" || role == "echo" || role == "answerer";
+  setup.is_burst = role == "receiver" || role == "sender";
   setup.own = setup.is_first ? "second" : "first";
   setup.partner = setup.is_first ? "first" : "second";
   const auto client = make_library_client();

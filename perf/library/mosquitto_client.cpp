@@ -62,11 +62,6 @@ class MosquittoClient final : public LibraryClient {
           "publish");
   }
 
-  void answer(const Setup&) override { fail(kNoRequests); }
-  void begin_asking(const Setup&) override { fail(kNoRequests); }
-  void ask(std::span<const std::byte>) override { fail(kNoRequests); }
-  void send_round(std::span<const std::byte>) override { fail(kNoRequests); }
-
   bool wait(Clock::time_point deadline) override {
     while (!woken_) {
       const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now());
@@ -81,8 +76,6 @@ class MosquittoClient final : public LibraryClient {
   void wake() override { woken_ = true; }
 
  private:
-  static constexpr const char* kNoRequests = "libmosquitto has no requests";
-
   mosquitto* mosquitto_ = nullptr;
   std::string partner_;
   OnMessage on_message_;

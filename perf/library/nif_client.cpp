@@ -1,5 +1,5 @@
-// NIF, with its callback: messages are seen to on the library's thread. Requests, and what they are
-// compared with, are those of GIMI, whose messages wait in queues.
+// Round trips are those of NIF, with its callback: messages are seen to on the library's thread.
+// Bursts, requests and what those are compared with are GIMI's, whose messages wait in queues.
 
 #include <atomic>
 #include <optional>
@@ -27,6 +27,10 @@ class NifClient final : public LibraryClient {
 
   void open(const Setup& setup, OnMessage on_message) override {
     on_message_ = std::move(on_message);
+    if (setup.is_burst) {
+      open_queue(setup);
+      return;
+    }
     nif_options options{};
     options.struct_size = sizeof options;
     options.url = setup.url.c_str();
@@ -49,6 +53,10 @@ class NifClient final : public LibraryClient {
   }
 
   void send(std::span<const std::byte> payload) override {
+    if (sender_) {
+      sender_->send(payload).or_throw();
+      return;
+    }
     check(nif_send_to(node_.load(), partner_.load(std::memory_order_relaxed), payload.data(),
                       payload.size()),
           "send");
@@ -76,8 +84,7 @@ class NifClient final : public LibraryClient {
     const Node& node = join(setup);
     service_ = setup.partner + "/echo";
     queue_.emplace(node.queue(kPlain));
-    const Peer partner = node.find(setup.partner).or_throw();
-    sender_.emplace(node.sender(partner, {.key = kPlain}).or_throw());
+    connect_to(node.find(setup.partner).or_throw());
   }
 
   void ask(std::span<const std::byte> payload) override {
@@ -95,6 +102,7 @@ class NifClient final : public LibraryClient {
  private:
   static constexpr MessageKey kPlain{1, 0};
   static constexpr Timeout kPatience{kPatienceMs};
+  static constexpr std::size_t kQueueMessages = 32'768;  ///< more than are under way
 
   const Node& join(const Setup& setup) {
     NodeOptions options;
@@ -103,6 +111,21 @@ class NifClient final : public LibraryClient {
     options.keep_token = false;
     options.resume = false;  // as above
     return gimi_.emplace(Node::join(options).or_throw());
+  }
+
+  void open_queue(const Setup& setup) {
+    const Node& node = join(setup);
+    if (!setup.is_first) connect_to(node.find(setup.partner).or_throw());
+    std::thread([this, queue = node.queue(kPlain, {.messages = kQueueMessages})] {
+      while (const auto message = queue.receive()) {  // until the node is closed
+        if (!sender_) connect_to(message->from());
+        on_message_(message->data());
+      }
+    }).detach();
+  }
+
+  void connect_to(Peer partner) {
+    sender_.emplace(gimi_->sender(partner, {.key = kPlain}).or_throw());
   }
 
   void take(const nif_incoming& in) {

@@ -68,7 +68,7 @@ class Suite(unittest.TestCase):
 
     def test_libraries_are_measured_where_a_hub_has_one(self):
         plan = suite.whole_plan(subjects.SUBJECTS)
-        self.assertEqual(plan[suite.Case("library_burst", 16, "tcp")], ("tcphub", "nats", "mosquitto"))
+        self.assertEqual(plan[suite.Case("library_burst", 16, "tcp")], ("tcphub", "nats", "mosquitto", "cyclonedds"))
         self.assertEqual(suite.smoke_plan(("null", "tcphub"))[suite.Case("library_burst", 16, "tcp")], ("tcphub",))
 
     def test_quick_measures_the_hub_s_variants_where_they_are_for(self):
@@ -130,6 +130,7 @@ class Subjects(unittest.TestCase):
     def test_what_a_subject_does_not_have_is_said(self):
         self.assertIn("Unix", subjects.why_absent("nats", suite.Case("library_burst", 16, "unix"), self.build))
         self.assertIn("librar", subjects.why_absent("mosquitto", suite.Case("one_to_one", 16, "tcp"), self.build))
+        self.assertIn("bursts", subjects.why_absent("cyclonedds", suite.Case("library_request", 16, "tcp"), self.build))
         self.assertIsNotNone(subjects.why_absent("null", suite.Case("idle_10000", 16, "tcp"), self.build))
         self.assertIsNone(subjects.why_absent("tcphub", suite.Case("list_100", 16, "unix"), self.build))
 

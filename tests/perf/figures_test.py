@@ -75,7 +75,9 @@ class Derived(unittest.TestCase):
                            [{"messages_per_second": rate, "cpu_ns_per_message": 2e8 / rate, "system_ns_per_message": 1e8 / rate}
                             for rate in rates])
         rows = make_rows([runs("tcphub", "unix", [6e6, 8e6]), runs("nats", "tcp", [2e6, 1e6]), runs("mosquitto", "tcp", [1e6, 2e6]),
-                          runs("mosquitto", "unix", [4e6, 2e6]), runs("tcphub", "tcp", [3e6, 3e6])])
+                          runs("mosquitto", "unix", [4e6, 2e6]), runs("tcphub", "tcp", [3e6, 3e6]),
+                          runs("cyclonedds", "tcp", [1.5e6, 6e6])])
+        self.assertEqual([rows[4]["spread"]["cpu_over_dds"], rows[0]["spread"]["rate_over_tcp"]], [[0.5, 2], [2, 8e6 / 3e6]])
         self.assertEqual(rows[0]["spread"]["rate_over_best"], [3, 4])
         self.assertEqual(rows[0]["spread"]["rate_over_best_unix"], [1.5, 4])
         self.assertAlmostEqual(rows[0]["spread"]["system_over_best_unix"][1], 1 / 1.5)
