@@ -245,8 +245,8 @@ class Endings(unittest.TestCase):
     def setUp(self):
         self.hub = Hub(self)
 
-    def ends(self, process, code, noise=""):
-        out, err = process.communicate(timeout=PATIENCE_S)
+    def ends(self, process, code, noise="", patience=PATIENCE_S):
+        out, err = process.communicate(timeout=patience)
         self.assertEqual((process.returncode, err), (code, noise), out)
         return out
 
@@ -326,6 +326,29 @@ print(len(os.listdir("/proc/self/task")), len(os.listdir("/proc/self/fd")))
             self.assertEqual([node.name for node in last.nodes()], ["n"])
         self.assertEqual([path for path in pathlib.Path(os.environ["XDG_RUNTIME_DIR"]).rglob("*") if path.stat().st_mtime >= begun
                           and path.is_file() and self.hub.url in path.read_text(errors="replace")], [])
+
+    def test_messages_kept_and_dropped_in_any_order_leave_no_memory(self):
+        """A hundred are kept, each in the place of one from before; an eighth is large and holds its batch."""
+        lines = f"""
+import random, resource
+views = gimnet.connect("views", hub=hub)
+publisher, subscription = node.advertise("image"), views.subscribe("a/image")
+publisher.wait_for_subscribers(1, {PATIENCE_S})
+content = lambda number: number.to_bytes(8, "little") * (12_500 if number % 8 == 0 else 2)
+kept = {{}}
+for begin in range(0, {1_000_000 if os.environ.get("GIMNET_STRESS") == "full" else 16_000}, 50):
+    for number in range(begin, begin + 50):
+        publisher.publish(content(number))
+    for number in range(begin, begin + 50):
+        data, place = subscription.receive({PATIENCE_S}).data, random.randrange(100)
+        before, old = kept.get(place, (0, content(0)))
+        if old != content(before): sys.exit(f"{{before}} was overwritten")
+        kept[place] = number, data
+    if begin == 4_000:
+        pages = int(open("/proc/self/statm").read().split()[0])
+        resource.setrlimit(resource.RLIMIT_AS, [pages * resource.getpagesize() + (64 << 20)] * 2)
+"""
+        self.ends(program(lines, self.hub, "a"), 0, patience=4 * PATIENCE_S)
 
     def test_a_thousand_handles_leave_no_thread_or_descriptor(self):
         with gimnet.connect("n", hub=self.hub.url) as node:
