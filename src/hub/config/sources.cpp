@@ -67,7 +67,7 @@ int read_whole(int descriptor, std::string& text) {
 }  // namespace
 
 ConfigText read_config_text(const std::string& path, bool pipes) {
-  struct stat info {};
+  struct stat info{};
   // Before it is opened: opening may already do something to a device, or wake the writer of a
   // pipe.
   if (::stat(path.c_str(), &info) != 0) return no_text(errno);
