@@ -20,7 +20,7 @@ from collections.abc import Callable
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 
 import report  # noqa: E402
-from driver import against, control, instructions, subjects, suite, usage  # noqa: E402
+from driver import against, control, instructions, network, subjects, suite, usage  # noqa: E402
 from driver.measure import Outcome, Settings, run_cases, say  # noqa: E402
 from driver.rows import absence_lines, faults_of, make_absences, make_rows, text_table  # noqa: E402
 from driver.subjects import SubjectError, allowed_cpus  # noqa: E402
@@ -49,6 +49,7 @@ def parse_arguments(given: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--update", action="store_true", help="with --instructions: make what is counted the budget")
     parser.add_argument("--control", action="store_true",
                         help="what the control plane takes, into docs/performance/control.json; with --report into docs/performance.md, too")
+    parser.add_argument("--network", action="store_true", help="what a network of hubs takes, into docs/performance/network.json; --report as there")
     parser.add_argument("--packages", action="store_true", help="only print the Debian packages that the run needs")
     parser.add_argument("--scenario", nargs="+", action="extend", choices=list(suite.SCENARIOS), default=[],
                         metavar="NAME", help=", ".join(suite.SCENARIOS))
@@ -96,7 +97,7 @@ def chosen_subjects(arguments: argparse.Namespace) -> tuple[str, ...]:
 def needed_packages(arguments: argparse.Namespace) -> list[str]:
     if arguments.instructions is not None:
         return ["valgrind"]
-    if arguments.against is not None or arguments.control:
+    if arguments.against is not None or arguments.control or arguments.network:
         return []
     packages = []
     for name in chosen_subjects(arguments):
@@ -227,19 +228,20 @@ def count_instructions(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def measure_control(arguments: argparse.Namespace) -> int:
+def measure_part(arguments: argparse.Namespace, part) -> int:
+    """`part`: control or network."""
     try:
-        figures = control.measure(arguments.build_dir)
+        figures = part.measure(arguments.build_dir)
     except (SubjectError, OSError, subprocess.TimeoutExpired) as error:
         say(f"error: {error}")
         return 1
     figures |= {"date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(), "machine": describe_machine(),
                 "version": program_version()}
-    control.FIGURES.write_text(json.dumps(figures, indent=1) + "\n")
-    text = control.describe(figures)
+    part.FIGURES.write_text(json.dumps(figures, indent=1) + "\n")
+    text = part.describe(figures)
     say(text)
     if arguments.report:
-        report.PAGE.write_text(report.fill(report.PAGE.read_text(), "control", text))
+        report.PAGE.write_text(report.fill(report.PAGE.read_text(), part.FIGURES.stem, text))
     return 0
 
 
@@ -270,8 +272,8 @@ def main() -> int:
         return 0
     if arguments.instructions is not None:
         return count_instructions(arguments)
-    if arguments.control:
-        return measure_control(arguments)
+    if arguments.control or arguments.network:
+        return measure_part(arguments, control if arguments.control else network)
     if arguments.against is not None:
         return compare_versions(arguments)
     return measure(arguments)

@@ -165,14 +165,14 @@ class TcpHub(Subject):
 
     name = "tcphub"
 
-    def __init__(self, build: pathlib.Path, cpus: list[int], arguments: list[str], name: str = "tcphub"):
+    def __init__(self, build: pathlib.Path, cpus: list[int], arguments: list[str], name: str = "tcphub", hub_id: int = 7):
         super().__init__(build, cpus)
-        self._arguments = arguments
+        self._arguments = ["--hub-id", str(hub_id), *arguments]
         self.name = name
 
     def command(self, folder: str) -> list[str]:
         return [str(self._build / "bin" / "tcphub"), "--listen", "tcp://127.0.0.1:0", "--listen",
-                f"unix:{folder}/socket", "--hub-id", "7", "--state-dir", f"{folder}/state", *self._arguments]
+                f"unix:{folder}/socket", "--state-dir", f"{folder}/state", *self._arguments]
 
 
 def find_program(name: str) -> str | None:

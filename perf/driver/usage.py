@@ -9,6 +9,7 @@ ALWAYS = ("packages", "build_dir")
 TAKEN_BY = {
     "--instructions": ("instructions", "update", *ALWAYS),
     "--control": ("control", "report", *ALWAYS),
+    "--network": ("network", "report", *ALWAYS),
     "--against": ("against", "json", "scenario", "size", "transport", "seconds", "runs", "hub_argument", *ALWAYS),
 }
 # What makes a run a part of the suite.
@@ -49,8 +50,8 @@ def mode_of(arguments: argparse.Namespace) -> str | None:
     """None: the suite is measured."""
     if arguments.instructions is not None:
         return "--instructions"
-    if arguments.control:
-        return "--control"
+    if arguments.control or arguments.network:
+        return "--control" if arguments.control else "--network"
     return "--against" if arguments.against is not None else None
 
 

@@ -6,7 +6,7 @@ import unittest
 
 import support  # noqa: F401
 import report
-from driver import control
+from driver import control, network
 from driver.subjects import SubjectError
 
 FIGURES = {
@@ -46,6 +46,15 @@ class Control(unittest.TestCase):
     def test_a_page_gets_it_in_place_of_the_former_one(self):
         page = "# P\n\n<!-- control: written by ./dev perf -->\n\nold\n\n<!-- end of control -->\n\nmore\n"
         self.assertEqual(report.fill(page, "control", "new"), page.replace("old", "new"))
+
+
+class NetworkPart(unittest.TestCase):
+    def test_the_paragraph_has_every_figure_and_goal(self):
+        figures = {name: [3.0, 1.0, 2.0] for name in network.GOALS}
+        text = " ".join(network.describe(FIGURES | {"figures": figures}).split())
+        self.assertEqual(text.count("2 (1 to 3; goal "), len(network.GOALS))
+        for goal in network.GOALS.values():
+            self.assertIn(f"; goal {network.shown(goal)})", text)
 
 
 if __name__ == "__main__":

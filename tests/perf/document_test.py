@@ -12,7 +12,7 @@ from unittest import mock
 
 from support import ROOT, outcome, result_of
 import report
-from driver import control, suite
+from driver import control, network, suite
 from driver.rows import Outcome, make_rows
 from driver.suite import FIELD_TITLES, GOALS
 
@@ -82,7 +82,9 @@ class Record(unittest.TestCase):
         record, page = json.loads(text), report.PAGE.read_text()
         self.assertEqual(report.record_text(record), text)
         self.assertEqual(report.fill(page, "figures", f"{report.where_and_when(record)}\n\n{report.make_table(record)}"), page)
-        self.assertEqual(report.fill(page, "control", control.describe(json.loads(control.FIGURES.read_text()))), page)
+        for part in (control, network):
+            if part.FIGURES.exists():
+                self.assertEqual(report.fill(page, part.FIGURES.stem, part.describe(json.loads(part.FIGURES.read_text()))), page)
 
     def test_every_verdict_is_explained_on_the_page(self):
         for word in ("goal", "bound", "met", "missed", "undecided"):
