@@ -212,10 +212,14 @@ gimi_status with_options(const Options* given, const char* doing, const char* na
   return body(*given);
 }
 
-/// A stream to who accepts a service. `on_place`, which may be null, is called with where that is,
-/// before anybody can say that it moved. Errors: as gimi_sender_to_service().
+/// The service of that full name, as the own hub lists it. Errors: as gimi_sender_to_service().
+[[nodiscard]] Outcome<ServiceRecord> listed_service(Core& core, const std::string& name,
+                                                    Timeout timeout);
+/// A stream to who accepts that service. `on_place`, which may be null, is called with where that
+/// is, before anybody can say that it moved. Errors: as gimi_sender_to_service().
 using OnPlace = std::function<void(const StreamTable::Stream& stream, const ServicePlace& place)>;
-[[nodiscard]] Outcome<StreamTable::Stream> stream_to_service(Core& core, const std::string& name,
+[[nodiscard]] Outcome<StreamTable::Stream> stream_to_service(Core& core,
+                                                             const ServiceRecord& service,
                                                              const SendOptions& options,
                                                              Timeout timeout,
                                                              const OnPlace& on_place = {});

@@ -70,7 +70,13 @@ Outcome<void> reach(Core& core, const std::string& service, std::int64_t deadlin
       answers = place.destination() == 0 || place.key.type == proto::gimi::kRequestType;
       if (answers) requests.learn(service, stream, place);
     };
-    const auto stream = stream_to_service(core, service, {}, left(), learn);
+    const auto listed = listed_service(core, service, left());
+    if (listed && listed->direction == Direction::provides) {
+      return Failure{Status::not_found, "cannot ask " + service +
+                                            ": it gives data and answers nothing; subscribe to it"};
+    }
+    const auto stream = listed ? stream_to_service(core, *listed, {}, left(), learn)
+                               : Outcome<StreamTable::Stream>(listed.failure());
     if (stream && !answers) {
       return Failure{Status::not_found,
                      "cannot ask " + service + ": it takes commands and answers nothing"};

@@ -32,9 +32,7 @@ gimi_status with_send_options(const gimi_send_options* options, const Body& body
 
 namespace gimnet::gimi {
 
-Outcome<StreamTable::Stream> stream_to_service(Core& core, const std::string& name,
-                                               const SendOptions& options, Timeout timeout,
-                                               const OnPlace& on_place) {
+Outcome<ServiceRecord> listed_service(Core& core, const std::string& name, Timeout timeout) {
   if (name.find('/') == std::string::npos) {
     return Failure{Status::bad_name, "cannot send to '" + name +
                                          "': a text names a service, as in robot/drive; find() "
@@ -44,16 +42,21 @@ Outcome<StreamTable::Stream> stream_to_service(Core& core, const std::string& na
   if (!found) return found.failure();
   // The listing takes patterns, too: only the service of that very name counts.
   const auto service = std::ranges::find(*found, name, &ServiceRecord::name);
-  if (service == found->end()) {
-    return Failure{Status::not_found,
-                   "cannot send to '" + name +
-                       "': there is no such service at the moment; watch() tells when there is"};
-  }
-  if (service->direction != Direction::accepts) {
+  if (service != found->end()) return *service;
+  return Failure{Status::not_found,
+                 "cannot send to '" + name +
+                     "': there is no such service at the moment; watch() tells when there is"};
+}
+
+Outcome<StreamTable::Stream> stream_to_service(Core& core, const ServiceRecord& service,
+                                               const SendOptions& options, Timeout timeout,
+                                               const OnPlace& on_place) {
+  const std::string& name = service.name;
+  if (service.direction != Direction::accepts) {
     return Failure{Status::not_found,
                    "cannot send to '" + name + "': it gives data and takes none; subscribe to it"};
   }
-  if (service->answers() && !on_place) {
+  if (service.answers() && !on_place) {
     return Failure{Status::not_found,
                    "cannot send to '" + name +
                        "': it answers questions and takes no data; ask it by request()"};
@@ -104,8 +107,13 @@ gimi_status gimi_sender_to_service(gimi_handle node, const char* full_name,
   return with<NodeObject>(node, [&](NodeObject& found) {
     return with_send_options(options, [&](const SendOptions& how) {
       StreamTable::Stream stream = found.core->streams().standing(full_name);
+      // A request to it made that stream: its refusal comes from the hub's answer.
+      if (stream != nullptr && found.core->requests().knows(full_name)) stream = nullptr;
       if (stream == nullptr) {
-        auto made = stream_to_service(*found.core, full_name, how, timeout_of(timeout_ms));
+        const Timeout timeout = timeout_of(timeout_ms);
+        const auto listed = listed_service(*found.core, full_name, timeout);
+        if (!listed) return fail(listed.failure());
+        auto made = stream_to_service(*found.core, *listed, how, timeout);
         if (!made) return fail(made.failure());
         stream = std::move(*made);
       }

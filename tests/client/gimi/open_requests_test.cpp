@@ -85,6 +85,16 @@ TEST_F(OpenRequestsTest, ASenderIsToldToAsk) {
   EXPECT_EQ(asker_.sender("calc/add").failure().sentence,
             "cannot send to 'calc/add': it answers questions and takes no data; ask it by "
             "request()");
+  const PendingReply asked = asker_.request_later("calc/add", "", kWait).or_throw();
+  EXPECT_TRUE(asker_.sender("calc/add").is(Status::not_found)) << "also once it was asked";
+}
+
+TEST_F(OpenRequestsTest, WhoAsksForDataIsToldToSubscribe) {
+  const Publisher odom = calc_->advertise("odom").or_throw();
+  EXPECT_EQ(asker_.request("calc/odom", "", kWait).failure().sentence,
+            "cannot ask calc/odom: it gives data and answers nothing; subscribe to it");
+  EXPECT_EQ(asker_.request("calc/nothing", "", kWait).failure().sentence,
+            "cannot ask calc/nothing: nobody answers there");
 }
 
 TEST_F(OpenRequestsTest, NobodyAnswersThere) {
