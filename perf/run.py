@@ -15,12 +15,13 @@ import re
 import signal
 import subprocess
 import sys
+import types
 from collections.abc import Callable
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 
 import report  # noqa: E402
-from driver import against, control, instructions, network, subjects, suite, usage  # noqa: E402
+from driver import against, control, instructions, network, python, subjects, suite, usage  # noqa: E402
 from driver.measure import Outcome, Settings, run_cases, say  # noqa: E402
 from driver.rows import absence_lines, faults_of, make_absences, make_rows, text_table  # noqa: E402
 from driver.subjects import SubjectError, allowed_cpus  # noqa: E402
@@ -31,6 +32,7 @@ WHOLE_SECONDS = 0.5
 RUNS = 3
 SMOKE_CLIENTS = 200  # of scenarios with 10,000 or 1,000: in a smoke run it is not counted how long they take
 SMOKE_PATIENCE_SECONDS = 30
+PARTS = {"control": control, "network": network, "python": python}  # modes with a place on the page of their own
 SKIPPED = 77  # what ctest takes for a test that was left out
 
 
@@ -50,6 +52,8 @@ def parse_arguments(given: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--control", action="store_true",
                         help="what the control plane takes, into docs/performance/control.json; with --report into docs/performance.md, too")
     parser.add_argument("--network", action="store_true", help="what a network of hubs takes, into docs/performance/network.json; --report as there")
+    parser.add_argument("--python", action="store_true",
+                        help="Python programs beside those of paho-mqtt and pyzmq, into docs/performance/python.json; --report as above")
     parser.add_argument("--packages", action="store_true", help="only print the Debian packages that the run needs")
     parser.add_argument("--scenario", nargs="+", action="extend", choices=list(suite.SCENARIOS), default=[],
                         metavar="NAME", help=", ".join(suite.SCENARIOS))
@@ -99,6 +103,8 @@ def needed_packages(arguments: argparse.Namespace) -> list[str]:
         return ["valgrind"]
     if arguments.against is not None or arguments.control or arguments.network:
         return []
+    if arguments.python:
+        return python.PACKAGES
     packages = []
     for name in chosen_subjects(arguments):
         if name in suite.RIVALS and any(name in wanted for wanted in choose_plan(arguments).values()):
@@ -228,8 +234,8 @@ def count_instructions(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def measure_part(arguments: argparse.Namespace, part) -> int:
-    """`part`: control or network."""
+def measure_part(arguments: argparse.Namespace, part: types.ModuleType) -> int:
+    """A part has figures and a place on the page of its own."""
     try:
         figures = part.measure(arguments.build_dir)
     except (SubjectError, OSError, subprocess.TimeoutExpired) as error:
@@ -272,8 +278,9 @@ def main() -> int:
         return 0
     if arguments.instructions is not None:
         return count_instructions(arguments)
-    if arguments.control or arguments.network:
-        return measure_part(arguments, control if arguments.control else network)
+    for mode, part in PARTS.items():
+        if getattr(arguments, mode):
+            return measure_part(arguments, part)
     if arguments.against is not None:
         return compare_versions(arguments)
     return measure(arguments)

@@ -10,6 +10,7 @@ TAKEN_BY = {
     "--instructions": ("instructions", "update", *ALWAYS),
     "--control": ("control", "report", *ALWAYS),
     "--network": ("network", "report", *ALWAYS),
+    "--python": ("python", "report", *ALWAYS),
     "--against": ("against", "json", "scenario", "size", "transport", "seconds", "runs", "hub_argument", *ALWAYS),
 }
 # What makes a run a part of the suite.
@@ -50,8 +51,9 @@ def mode_of(arguments: argparse.Namespace) -> str | None:
     """None: the suite is measured."""
     if arguments.instructions is not None:
         return "--instructions"
-    if arguments.control or arguments.network:
-        return "--control" if arguments.control else "--network"
+    for mode in ("control", "network", "python"):
+        if getattr(arguments, mode):
+            return flag(mode)
     return "--against" if arguments.against is not None else None
 
 

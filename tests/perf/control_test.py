@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""What perf/driver/control.py reads out of the programs that it runs, and the paragraph that it makes of that."""
+"""What perf/driver/control.py reads out of the programs that it runs, and the paragraphs that it and python.py make of that."""
 
 import pathlib
 import unittest
 
 import support  # noqa: F401
 import report
-from driver import control, network
+from driver import control, network, python
 from driver.subjects import SubjectError
 
 FIGURES = {
@@ -41,6 +41,16 @@ class Control(unittest.TestCase):
         text = " ".join(control.describe(FIGURES).split())
         for expected in ("2026-01-01, a processor, 2 processors, GIMnet 0.1.", "all 10,000 nodes are back in 2.5 s (1.5 to 4; goal 10 s)",
                          "takes 4 ms from start to end, at most 5 (goal 50 ms)", "names on the hub: resolve 0.1 to 0.25."):
+            self.assertIn(expected, text)
+
+    def test_so_has_that_of_python(self):
+        figures = FIGURES | {"import_ms": 12.3, "messages_per_second": {
+            "burst": {"gimnet": [60.0, 70.0, 90.0], "paho": [10.0, 10.0, 10.0], "pyzmq": [300.0, 140.0, 180.0]},
+            "arrays": {"gimnet": [9.0, 8.0, 7.0], "pyzmq": [10.0, 8.0, 14.0]}}}
+        text = " ".join(python.describe(figures).split())
+        for expected in ("GIMnet 0.1. rate of 16 B, times paho-mqtt: 7 (goal 6, met)", "times pyzmq: 0.5 (goal 0.3, met)",
+                         "rate of 1 MiB, times pyzmq: 0.9 (goal 1, missed)", "`import gimnet`: 12 ms of a processor more than `pass` (goal 50)",
+                         "messages a second, 16 B: gimnet 70, paho 10, pyzmq 180; messages a second, 1 MiB: gimnet 8, pyzmq 10."):
             self.assertIn(expected, text)
 
     def test_a_page_gets_it_in_place_of_the_former_one(self):

@@ -70,6 +70,7 @@ class Arguments(unittest.TestCase):
                                 ("--instructions --runs 3", "--runs means nothing with --instructions"),
                                 ("--control --quick", "--quick means nothing with --control"),
                                 ("--network --json", "--json means nothing with --network"),
+                                ("--python --runs 3", "--runs means nothing with --python"),
                                 ("--against HEAD --only nats", "--subjects means nothing with --against"),
                                 ("--against HEAD --report", "--report means nothing with --against"),
                                 ("--against HEAD --quick", "--quick means nothing with --against"),
