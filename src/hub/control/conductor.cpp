@@ -83,17 +83,17 @@ std::optional<Goodbye> Conductor::admit(Stranger& stranger, const proto::Hello& 
     return links_->admit(stranger, hello, {moment.now, moment.wall_ns});
   if (moving_ != nullptr && !draining_ && moving_->take(stranger, hello, moment.now))
     return std::nullopt;
-  return admit_node(stranger, hello, moment);
+  return admit_node(stranger, hello, moment, false);
 }
 
 std::optional<Goodbye> Conductor::admit_node(Stranger& stranger, const proto::Hello& hello,
-                                             Moment moment) {
+                                             Moment moment, bool had_name) {
   if (draining_)
     return Goodbye{GoodbyeCode::draining, "the hub is shutting down; connect to another one"};
   Effects effects;
+  const milliseconds wall{moment.wall_ns / 1'000'000};
   const auto joined =
-      membership_.join(join_request_of(stranger, hello, milliseconds{moment.wall_ns / 1'000'000}),
-                       moment.now, effects);
+      membership_.join(join_request_of(stranger, hello, wall, had_name), moment.now, effects);
   carry_out(effects, moment.now);
   if (!joined) return joined.error();
   attach(stranger, hello, *joined, moment);
@@ -262,8 +262,8 @@ void Conductor::on_link_frame(const ControlFrameEvent& event, milliseconds now) 
 }
 
 void Conductor::admit_moved(std::span<const HubAnswer> answers, milliseconds now) {
-  moving_->settle(answers, now, [this, now](Stranger& stranger, const proto::Hello& hello) {
-    return admit_node(stranger, hello, {now, moment(now).wall_ns});
+  moving_->settle(answers, now, [&](Stranger& stranger, const proto::Hello& hello, bool had_name) {
+    return admit_node(stranger, hello, {now, moment(now).wall_ns}, had_name);
   });
 }
 

@@ -123,7 +123,8 @@ class Conductor final : private Administration {
 
  private:
   [[nodiscard]] std::optional<proto::Goodbye> admit_node(Stranger& stranger,
-                                                         const proto::Hello& hello, Moment moment);
+                                                         const proto::Hello& hello, Moment moment,
+                                                         bool had_name);
   /// Admits nodes of other hubs that wait no longer.
   void admit_moved(std::span<const HubAnswer> answers, std::chrono::milliseconds now);
   void attach(Stranger& stranger, const proto::Hello& hello, const Membership::Joined& joined,

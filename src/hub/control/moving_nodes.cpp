@@ -11,8 +11,8 @@ namespace gimnet::hub {
 
 using std::chrono::milliseconds;
 
-JoinRequest join_request_of(const Stranger& stranger, const proto::Hello& hello,
-                            milliseconds wall) {
+JoinRequest join_request_of(const Stranger& stranger, const proto::Hello& hello, milliseconds wall,
+                            bool had_name) {
   JoinRequest request;
   request.role = hello.role;
   request.name = hello.name;
@@ -28,6 +28,7 @@ JoinRequest join_request_of(const Stranger& stranger, const proto::Hello& hello,
   request.resumes = hello.resume;
   request.wall = wall;
   request.former = hello.former;
+  request.had_name = had_name;
   return request;
 }
 
@@ -43,7 +44,11 @@ bool MovingNodes::take(Stranger& stranger, const proto::Hello& hello, millisecon
       hub,
       control_frame(proto::Kind::ns, make_id<NodeId>(hub, kHubIndex), parts_.facts.id, request));
   if (!asked) return false;
-  waiting_.push_back({std::move(stranger), hello, last_request_, now + kAnswerTime, false, false});
+  // The answer may come behind the news that the name is free, and then the claim is gone.
+  const NameCopies* const copies = parts_.names.copies();
+  const auto known = copies == nullptr ? std::nullopt : copies->find(hello.name);
+  const bool had_name = known && known->claim->node == hello.former;
+  waiting_.push_back({std::move(stranger), hello, last_request_, now + kAnswerTime, had_name});
   return true;
 }
 
@@ -67,7 +72,9 @@ void MovingNodes::settle(std::span<const HubAnswer> answers, milliseconds now, c
   }
   for (Waiting& each : due) {
     if (each.let_go) parts_.names.note_let_go(each.hello.name, hub_of(each.hello.former));
-    if (const auto refusal = admit(each.stranger, each.hello)) turn_away(each.stranger, *refusal);
+    const bool had_name = each.let_go && each.had_name;
+    if (const auto refusal = admit(each.stranger, each.hello, had_name))
+      turn_away(each.stranger, *refusal);
   }
 }
 

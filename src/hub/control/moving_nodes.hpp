@@ -22,7 +22,7 @@ namespace gimnet::hub {
 /// The request of a stranger that says HELLO as a node. `wall`: since 1970. Valid until: `hello`
 /// changes.
 [[nodiscard]] JoinRequest join_request_of(const Stranger& stranger, const proto::Hello& hello,
-                                          std::chrono::milliseconds wall);
+                                          std::chrono::milliseconds wall, bool had_name);
 
 /// An answer to a request of this hub itself.
 struct HubAnswer {
@@ -51,8 +51,10 @@ class MovingNodes {
   /// Takes the stranger's transport if HELLO shows the token of a hub that can be asked.
   [[nodiscard]] bool take(Stranger& stranger, const proto::Hello& hello,
                           std::chrono::milliseconds now);
-  /// Takes the stranger's transport and returns nothing, or leaves it and says why not.
-  using Admit = std::function<std::optional<proto::Goodbye>(Stranger&, const proto::Hello&)>;
+  /// Takes the stranger's transport and returns nothing, or leaves it and says why not. `had_name`:
+  /// see JoinRequest.
+  using Admit =
+      std::function<std::optional<proto::Goodbye>(Stranger&, const proto::Hello&, bool had_name)>;
   /// Admits those who wait no longer. To be called when time passes, routes change or answers come.
   void settle(std::span<const HubAnswer> answers, std::chrono::milliseconds now,
               const Admit& admit);
@@ -64,6 +66,7 @@ class MovingNodes {
     proto::Hello hello;
     std::uint16_t request = 0;
     std::chrono::milliseconds until{};
+    bool had_name = false;
     bool answered = false;
     bool let_go = false;
   };

@@ -31,12 +31,23 @@ struct MovingRig : LinkedRigs {
   /// Gives the number of those that are admitted then.
   std::size_t settle(std::span<const HubAnswer> answers) {
     std::size_t admitted = 0;
-    moving.settle(answers, a.now, [&](Stranger&, const proto::Hello&) {
+    moving.settle(answers, a.now, [&](Stranger&, const proto::Hello&, bool had_name) {
       ++admitted;
+      admitted_with_name += had_name ? 1 : 0;
       return std::optional<proto::Goodbye>{};
     });
     return admitted;
   }
+  /// Node 2.3 has the name "robot", as hub 2 says.
+  void learn_name() {
+    proto::route::NameClaim claim;
+    claim.version = 1;
+    claim.node = make_id<NodeId>(HubId{2}, 3);
+    const auto names =
+        proto::encode(proto::route::Names{HubId{2}, b.facts.instance, 0, 1, 0, {{"robot", claim}}});
+    a.names.take(a.links.all().begin()->first, names, a.now);
+  }
+  std::size_t admitted_with_name = 0;
   RemoteRequests requests{{a.facts, a.shards, a.links}};
   MovingNodes moving{{a.facts, a.limits, a.links, a.names}};
 };
@@ -64,6 +75,23 @@ TEST(MovingNodes, AreAdmittedWhenTheirFormerHubHasAnswered) {
   EXPECT_FALSE(rig.requests.take(event, rig.a.now));
   EXPECT_EQ(rig.settle(rig.requests.take_own_answers()), 1u);
   EXPECT_FALSE(rig.moving.next_due());
+}
+
+TEST(MovingNodes, HadTheNameThatTheirFormerHubLetGoOf) {
+  MovingRig rig;
+  const auto answer = [](std::uint16_t request, proto::Status status) {
+    return std::vector<HubAnswer>{{HubId{2}, request, status}};
+  };
+  ASSERT_TRUE(rig.take(HubId{2}));
+  EXPECT_EQ(rig.settle(answer(1, proto::Status::done)), 1u);
+  EXPECT_EQ(rig.admitted_with_name, 0u) << "nobody was known to have it";
+  rig.learn_name();
+  ASSERT_TRUE(rig.take(HubId{2}));
+  EXPECT_EQ(rig.settle(answer(2, proto::Status::not_found)), 1u);
+  EXPECT_EQ(rig.admitted_with_name, 0u) << "the token did not count";
+  ASSERT_TRUE(rig.take(HubId{2}));
+  EXPECT_EQ(rig.settle(answer(3, proto::Status::done)), 1u);
+  EXPECT_EQ(rig.admitted_with_name, 1u);
 }
 
 TEST(MovingNodes, DoNotWaitForAHubThatIsSilentOrAway) {

@@ -14,8 +14,6 @@ constexpr milliseconds kWithin{1'300};
 
 /// A node still counts as connected at its former hub when it shows its token elsewhere.
 void Settled::check_moves() {
-  // A hub that drew its id again leaves claims behind that count for the grace time.
-  if (world_.plan_.collisions) return;
   std::vector<SimNode*> moved;
   for (SimNode& node : world_.nodes_) {
     const std::size_t to = node.at() == node.plan().hub ? node.plan().other : node.plan().hub;

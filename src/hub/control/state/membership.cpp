@@ -36,7 +36,7 @@ Result<Membership::Joined, proto::Goodbye> Membership::join(const JoinRequest& r
       sessions_.claim({request.token, request.name, request.identity, request.wall});
   if (!request.name.empty()) {
     if (std::optional<proto::Goodbye> refusal =
-            name_refusal(request.name, claim.session, request.former, now)) {
+            name_refusal(request.name, claim.session, request, now)) {
       return std::move(*refusal);
     }
   }

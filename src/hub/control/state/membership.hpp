@@ -41,6 +41,9 @@ struct JoinRequest {
   bool resumes = false;  ///< it asks for resume
   std::chrono::milliseconds wall{};  ///< since 1970: tokens expire by it
   NodeId former;  ///< the id that the node had; at this hub or another one; 0: none
+  /// The hub of `former` let go of it, and it had the best claim to the name: older claims, of hubs
+  /// that cannot be reached, do not count.
+  bool had_name = false;
 };
 
 /// The state of one hub without its neighbours: its nodes, their names and services. Makes sure
@@ -153,12 +156,15 @@ class Membership {
                                                            const Sessions::Claim& claim,
                                                            std::chrono::milliseconds now,
                                                            Effects& effects);
-  /// Why `claimant` (nullptr: somebody new) cannot have the name. `former`: its id before, 0: none.
+  /// Why `claimant` (nullptr: somebody new) cannot have the name. Of `request` only
+  /// `former` and `had_name` are looked at.
   [[nodiscard]] std::optional<proto::Goodbye> name_refusal(std::string_view name,
-                                                           const Session* claimant, NodeId former,
+                                                           const Session* claimant,
+                                                           const JoinRequest& request,
                                                            std::chrono::milliseconds now) const;
   /// The same, for what other hubs and services have.
-  [[nodiscard]] std::optional<proto::Goodbye> network_refusal(std::string_view name, NodeId former,
+  [[nodiscard]] std::optional<proto::Goodbye> network_refusal(std::string_view name,
+                                                              const JoinRequest& request,
                                                               std::chrono::milliseconds now) const;
   /// Is nobody waiting for the session's node to come back?
   [[nodiscard]] static bool ends_with_connection(const Session& session, const Ending& ending);

@@ -22,14 +22,16 @@ std::string holder_of(const KnownName& known) {
 }  // namespace
 
 std::optional<proto::Goodbye> Membership::name_refusal(std::string_view name,
-                                                       const Session* claimant, NodeId former,
+                                                       const Session* claimant,
+                                                       const JoinRequest& request,
                                                        milliseconds now) const {
   if (auto refusal = directory_.refusal(name, claimant, sessions_, now)) return refusal;
   if (claimant != nullptr && claimant->name == name) return std::nullopt;
-  return network_refusal(name, former, now);
+  return network_refusal(name, request, now);
 }
 
-std::optional<proto::Goodbye> Membership::network_refusal(std::string_view name, NodeId former,
+std::optional<proto::Goodbye> Membership::network_refusal(std::string_view name,
+                                                          const JoinRequest& request,
                                                           milliseconds now) const {
   if (const Topic* topic = services_.find(name); topic != nullptr && topic->provided())
     return taken(quoted(name) + "is the full name of a service");
@@ -46,7 +48,8 @@ std::optional<proto::Goodbye> Membership::network_refusal(std::string_view name,
   if (known->standing == proto::ns::NameStanding::held)
     return taken(quoted(name) + "is held by " + holder_of(*known));
   if (known->standing == proto::ns::NameStanding::away) return std::nullopt;
-  if (known->claim->node == former) return std::nullopt;  // nobody can be asked for a better proof
+  // Nobody can be asked for a better proof.
+  if (known->claim->node == request.former || request.had_name) return std::nullopt;
   const auto left = std::max<std::int64_t>(1, (known->until - now).count() / 1'000);
   return proto::Goodbye{GoodbyeCode::name_taken,
                         quoted(name) + "is that of " + holder_of(*known) +

@@ -72,6 +72,17 @@ TEST_F(MembershipNetworkTest, ANodeThatComesFromAHubThatIsAwayHasItsNameAtOnce) 
   EXPECT_TRUE(membership_.join(request, 1s, effects_));
 }
 
+TEST_F(MembershipNetworkTest, AnOlderClaimOfAHubThatIsAwayDoesNotStopANodeThatMoves) {
+  put("robot", 1);
+  JoinRequest request;
+  request.name = "robot";
+  request.identity = Identity::open();
+  request.had_name = true;
+  EXPECT_FALSE(membership_.join(request, 1s, effects_)) << "its hub can be reached";
+  (void)names_.set_reachable({}, milliseconds(0));
+  EXPECT_TRUE(membership_.join(request, 1s, effects_));
+}
+
 TEST_F(MembershipNetworkTest, ANameThatItsHubLetGoOfIsFreeAndHasTheHigherRank) {
   put("robot", 1);
   names_.note_let_go("robot", kOther.hub);
