@@ -14,6 +14,8 @@ constexpr std::size_t kSendsOfAllMost = 2'000;
 /// Names that are asked for at each hub, beside those that several nodes want.
 constexpr std::size_t kNamesMost = 12;
 constexpr std::uint64_t kFrameBytesMost = 140;
+/// Control frames that a link carries meanwhile.
+constexpr std::uint64_t kBytesAhead = 10'000;
 
 std::uint64_t hop_limits(const hub::ShardCounters& counters) {
   return counters.dropped[static_cast<std::size_t>(proto::DropReason::hop_limit)].value();
@@ -81,7 +83,8 @@ void Settled::send_to_all() {
   std::uint64_t enough_ms = 1'000 + kSlowestMs * distance_.size();
   for (const Wire& wire : world_.wires_) {
     if (wire.plan.bytes_per_ms == 0) continue;
-    enough_ms = std::max(enough_ms, pairs_.size() * kFrameBytesMost / wire.plan.bytes_per_ms);
+    const std::uint64_t bytes = kBytesAhead + pairs_.size() * kFrameBytesMost;
+    enough_ms = std::max(enough_ms, bytes / wire.plan.bytes_per_ms);
   }
   world_.run_until(world_.now() + milliseconds{enough_ms});
   std::uint64_t later = 0;

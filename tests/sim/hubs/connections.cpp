@@ -35,6 +35,7 @@ void World::dial(std::size_t machine, hub::LinkNumber number, const hub::Dialled
   line->hello = hello;
   line->dialler_life = machines_[machine].life;
   lines_.push_back(line);
+  note("wire " + std::to_string(wire) + " is dialled on line " + std::to_string(line->number));
   after_ms(kAttemptMs, [this, line] {
     if (line->stream != nullptr) fail(*line, {net::Fault::timeout, "nobody answers"});
   });

@@ -26,12 +26,14 @@ void Flow::take(Random& random, milliseconds now, const Tap& tap) {
   if (way_.bytes_per_ms != 0)
     allowed_ = std::min(allowed_ + way_.bytes_per_ms, kBurstMs * way_.bytes_per_ms);
   if (from_.readable() != 0) {
-    std::size_t most = kWindow - std::min(kWindow, bytes_);
+    const std::size_t window = kWindow + 2 * way_.delay_ms * way_.bytes_per_ms;
+    std::size_t most = window - std::min(window, bytes_);
     if (way_.bytes_per_ms != 0) most = std::min(most, static_cast<std::size_t>(allowed_));
     Piece piece;
     if (most != 0) from_.read(piece.bytes, most);
     if (piece.bytes.empty()) return;
     if (way_.bytes_per_ms != 0) allowed_ -= piece.bytes.size();
+    if (spoils_ && frames_.empty()) spoil(piece.bytes);
     frames_.insert(frames_.end(), piece.bytes.begin(), piece.bytes.end());
     look(tap);
     piece.at = last_ =
@@ -42,6 +44,16 @@ void Flow::take(Random& random, milliseconds now, const Tap& tap) {
     says_end_ = true;
     under_way_.push_back({std::max(last_, now + milliseconds{way_.delay_ms}), {}});
   }
+}
+
+/// As a hub of a later version would write it.
+void Flow::spoil(std::span<std::byte> frame) {
+  if (frame.size() < proto::kHeaderSize) return;
+  proto::FrameHeader header = proto::load_header(frame.data());
+  if (header.kind != proto::Kind::unicast) return;
+  header.flags |= proto::kFlagReservedMask;
+  proto::store_header(frame.data(), header);
+  spoils_ = false;
 }
 
 void Flow::look(const Tap& tap) {

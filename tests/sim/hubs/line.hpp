@@ -32,7 +32,8 @@ class Flow {
   [[nodiscard]] std::optional<std::vector<std::byte>> arrive(std::chrono::milliseconds now);
   /// Nothing comes any more.
   [[nodiscard]] bool ended() const { return ended_; }
-  void lose_all() { under_way_.clear(); }
+  /// Sets a reserved flag in the next UNICAST.
+  void spoil_next() { spoils_ = true; }
 
  private:
   struct Piece {
@@ -40,6 +41,7 @@ class Flow {
     std::vector<std::byte> bytes;
   };
   void look(const Tap& tap);
+  void spoil(std::span<std::byte> frame);
 
   const WirePlan& way_;
   hub::MemoryPeer from_;
@@ -49,6 +51,7 @@ class Flow {
   std::chrono::milliseconds last_{0};
   std::vector<std::byte> frames_;  ///< taken, not told to the tap
   std::size_t skip_;
+  bool spoils_ = false;
   bool says_end_ = false;
   bool ended_ = false;
 };

@@ -27,6 +27,8 @@ struct WirePlan {
   std::uint64_t delay_ms = 1;
   std::uint64_t jitter_ms = 0;
   std::uint32_t bytes_per_ms = 0;  ///< 0: no limit
+  /// Of the link, with a keep-alive each quarter of it. 0: as of any link.
+  std::uint32_t silent_ms = 0;
 };
 
 struct NodePlan {

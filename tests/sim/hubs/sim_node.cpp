@@ -27,6 +27,8 @@ constexpr std::uint64_t kGiversMost = 12;
 constexpr const char* kGiven = "gives";
 constexpr std::uint64_t kSmallBytes = 100;
 constexpr std::uint64_t kLargeBytes = 20'000;
+/// dst of a BROADCAST to all hubs.
+constexpr std::uint32_t kEverybody = 0xFFFF'FFFF;
 
 }  // namespace
 
@@ -94,8 +96,8 @@ void SimNode::begin_session(NodeId id, bool new_session) {
   if (new_session) group_.reset();
 }
 
-void SimNode::move(milliseconds now) {
-  at_ = at_ == plan_.hub ? plan_.other : plan_.hub;
+void SimNode::move_to(std::size_t hub, milliseconds now) {
+  at_ = hub;
   up_ = false;
   last_ = "moved at " + std::to_string(now.count());
   back_at_ = now + milliseconds{around_.random.between(1, 50)};
@@ -146,12 +148,15 @@ void SimNode::take(const proto::FrameHeader& header, std::span<const std::byte> 
       const std::uint32_t own =
           header.kind == Kind::unicast ? id_.value() : group_.value_or(GroupId{}).value();
       if (header.dst != own) broken(Checker::right_node, "a node gets a frame for another id");
+      ++taken_;
       return around_.book.note_arrived(payload, session_);
     }
     case Kind::group:
       if (administers_ && payload.size() >= Book::kNumberBytes)
         heard_[GroupId{header.dst}].push_back(load_le<std::uint64_t>(payload.data()));
       return;
+    case Kind::broadcast:
+      return broadcasts_.push_back(load_le<std::uint64_t>(payload.data()));
     case Kind::flow:
       return take_flow(payload);
     case Kind::report:
@@ -226,7 +231,8 @@ void SimNode::take_control(std::span<const std::byte> payload) {
 void SimNode::say() {
   Random& random = around_.random;
   const std::uint64_t choice = random.below(100);
-  const std::uint64_t bytes_most = random.chance(30) ? kLargeBytes : kSmallBytes;
+  const std::uint64_t bytes =
+      Book::kNumberBytes + random.below(random.chance(30) ? kLargeBytes : kSmallBytes);
   const proto::Policy policy = random.chance(800) ? proto::Policy::block : proto::Policy::drop;
   if (choice < 10) return ask_something();
   if (choice < 14) {
@@ -238,14 +244,13 @@ void SimNode::say() {
     auto entry = around_.book.groups().begin();
     std::advance(entry, static_cast<std::ptrdiff_t>(random.below(around_.book.groups().size())));
     // Nobody knows who has it by then.
-    static_cast<void>(send(Kind::service, entry->first.value(), 0, bytes_most, policy));
+    static_cast<void>(send(Kind::service, entry->first.value(), 0, bytes, policy));
     return;
   }
   const auto& known = around_.book.known();
   const NodeId to = random.pick(known);
   if (to == id_) return;
-  static_cast<void>(
-      send(Kind::unicast, to.value(), around_.book.session_of(to), bytes_most, policy));
+  static_cast<void>(send(Kind::unicast, to.value(), around_.book.session_of(to), bytes, policy));
 }
 
 void SimNode::ask_something() {
@@ -299,15 +304,20 @@ void SimNode::ask(Kind kind, const proto::Payload& payload, std::uint16_t reques
   write(kind, hub == HubId{} ? 0 : make_id<NodeId>(hub, kHubIndex).value(), payload);
 }
 
-std::optional<std::uint64_t> SimNode::send_to(NodeId to) {
-  return send(Kind::unicast, to.value(), around_.book.session_of(to), kSmallBytes,
-              proto::Policy::block);
+std::optional<std::uint64_t> SimNode::send_to(NodeId to, std::uint64_t bytes) {
+  if (bytes == 0) bytes = Book::kNumberBytes + around_.random.below(kSmallBytes);
+  return send(Kind::unicast, to.value(), around_.book.session_of(to), bytes, proto::Policy::block);
+}
+
+void SimNode::broadcast(std::uint64_t number) {
+  std::vector<std::byte> payload(Book::kNumberBytes);
+  store_le(payload.data(), number);
+  write(Kind::broadcast, kEverybody, payload);
 }
 
 std::optional<std::uint64_t> SimNode::send(Kind kind, std::uint32_t dst, std::uint64_t session,
-                                           std::uint64_t bytes_most, proto::Policy policy) {
+                                           std::uint64_t bytes, proto::Policy policy) {
   if (paused_.contains({kind, Lane::normal, dst})) return std::nullopt;
-  const std::uint64_t bytes = Book::kNumberBytes + around_.random.below(bytes_most);
   const std::uint64_t number = around_.book.note_sent(at_, session);
   std::vector<std::byte> payload(static_cast<std::size_t>(bytes));
   store_le(payload.data(), number);

@@ -35,7 +35,8 @@ class SimNode {
   /// Its process ends, and comes back later with or without its memory.
   void crash(milliseconds now);
   /// It dials its other hub, and the one where it was hears nothing of it.
-  void move(milliseconds now);
+  void move(milliseconds now) { move_to(at_ == plan_.hub ? plan_.other : plan_.hub, now); }
+  void move_to(std::size_t hub, milliseconds now);
 
   [[nodiscard]] bool is_up() const { return up_ && welcomed_; }
   [[nodiscard]] const NodePlan& plan() const { return plan_; }
@@ -48,8 +49,17 @@ class SimNode {
   [[nodiscard]] std::optional<GroupId> given() const { return given_; }
   [[nodiscard]] bool is_paused() const { return !paused_.empty(); }
 
-  /// A small frame. Returns its number; nothing: it was told to pause. REQUIRES: is_up().
-  std::optional<std::uint64_t> send_to(NodeId to);
+  /// A frame with BLOCK; `bytes`: 8 at least, 0: a few. Returns its number; nothing: it was told to
+  /// pause. REQUIRES: is_up().
+  std::optional<std::uint64_t> send_to(NodeId to, std::uint64_t bytes = 0);
+  /// Its hub has not read what it wrote.
+  [[nodiscard]] bool is_blocked() const { return pipe_.transport_readable(); }
+  /// Frames of other nodes that came.
+  [[nodiscard]] std::uint64_t taken() const { return taken_; }
+  /// To all nodes of all hubs.
+  void broadcast(std::uint64_t number);
+  /// The numbers that came.
+  [[nodiscard]] const std::vector<std::uint64_t>& broadcasts() const { return broadcasts_; }
   /// A message to the subscribers of its service. Returns its number. REQUIRES: given().
   std::uint64_t publish();
   /// To the service that a node of that name provides, if there is one.
@@ -86,7 +96,7 @@ class SimNode {
   void write(proto::Kind kind, std::uint32_t dst, std::span<const std::byte> payload,
              std::uint8_t flags = 0);
   std::optional<std::uint64_t> send(proto::Kind kind, std::uint32_t dst, std::uint64_t session,
-                                    std::uint64_t bytes_most, proto::Policy policy);
+                                    std::uint64_t bytes, proto::Policy policy);
 
   const Around around_;
   const NodePlan plan_;
@@ -108,6 +118,8 @@ class SimNode {
   bool gives_ = false;            ///< it has a service with last message, each time that it joins
   std::optional<GroupId> given_;
   std::uint64_t published_ = 0;
+  std::uint64_t taken_ = 0;
+  std::vector<std::uint64_t> broadcasts_;
   std::set<std::string> wanted_;  ///< full names of services
   std::map<GroupId, std::vector<std::uint64_t>> heard_;
   milliseconds now_{0};

@@ -4,6 +4,8 @@
 #include <cstdio>
 #include <cstring>
 
+#include "tests/sim/hubs/scenes.hpp"
+
 namespace gimnet::sim::hubs {
 namespace {
 
@@ -15,12 +17,14 @@ constexpr milliseconds kLookEvery{100};
 /// A clock of the hubs that never shows 0.
 constexpr milliseconds kBegin{1'000};
 constexpr std::int64_t kNsPerMs = 1'000'000;
-constexpr std::uint32_t kIdsOfADisk = 16'384;
+constexpr std::uint32_t kIdsOfADisk = 4'096;
 
 }  // namespace
 
 World::World(const Options& options)
-    : options_(options), random_(options.seed), plan_(draw_plan(random_, options.size)) {
+    : options_(options),
+      random_(options.seed),
+      plan_(options.scene != nullptr ? options.scene->plan() : draw_plan(random_, options.size)) {
   for (const HubPlan& each : plan_.hubs) {
     Machine machine;
     machine.plan = each;
@@ -46,8 +50,10 @@ hub::HubState World::new_disk(std::uint64_t unique) {
 }
 
 std::string World::words() const {
-  return std::to_string(machines_.size()) + " hubs, " + std::to_string(wires_.size()) + " links, " +
-         std::to_string(nodes_.size()) + " nodes, " + std::to_string(plan_.faults) +
+  const std::string scene =
+      options_.scene == nullptr ? std::string{} : std::string{options_.scene->name} + ", ";
+  return scene + std::to_string(machines_.size()) + " hubs, " + std::to_string(wires_.size()) +
+         " links, " + std::to_string(nodes_.size()) + " nodes, " + std::to_string(plan_.faults) +
          " faults, at " + std::to_string(now_.count()) + " ms";
 }
 
@@ -67,15 +73,17 @@ void World::note_plan() const {
 std::optional<Broken> World::run() {
   now_ = kBegin;
   if (options_.print) note_plan();
-  agenda_.at(kBegin, [] {});
-  while (agenda_.step(kBegin)) {
-  }
   for (std::size_t hub = 0; hub < machines_.size(); ++hub)
     after_ms(random_.below(500), [this, hub] { start(hub); });
-  for (std::uint64_t i = 0; i < plan_.faults; ++i)
+  for (std::uint64_t i = 0; i < plan_.faults && options_.scene == nullptr; ++i)
     after_ms(1'000 + random_.below(6'000), [this] { fault(); });
   try {
-    run_until(kFaultsEnd);
+    if (options_.scene != nullptr) {
+      Stage stage(*this);
+      options_.scene->play(stage);
+    } else {
+      run_until(kFaultsEnd);
+    }
     heal();
     run_until(now_ + kSettled);
     if (Settled::waits(*this)) run_until(now_ + kWaits);
@@ -156,6 +164,8 @@ SimHub::Setup World::setup_of(std::size_t machine) {
     if (!wires_[wire].wanted || wires_[wire].plan.dialler != machine) continue;
     setup.links.dial.push_back(link_of(wire));
     setup.links.dial.back().cost = wires_[wire].plan.cost;
+    const std::uint32_t silent_ms = wires_[wire].plan.silent_ms;
+    if (silent_ms != 0) setup.links.dial.back().terms = {silent_ms / 4, silent_ms, {}};
   }
   return setup;
 }

@@ -13,6 +13,8 @@
 
 namespace gimnet::sim::hubs {
 
+struct Scene;
+
 /// Of one link, with its jitter.
 inline constexpr std::uint64_t kSlowestMs = 60;
 
@@ -48,7 +50,9 @@ class World {
   struct Options {
     std::uint64_t seed = 1;
     Size size;
-    bool print = false;  ///< what happens, in words
+    bool print = false;            ///< what happens, in words
+    const Scene* scene = nullptr;  ///< takes the place of what the seed draws. Null: none
+    bool is_long = false;          ///< the scene may take longer
   };
   explicit World(const Options& options);
   /// Nothing: all is as it should be.
@@ -58,6 +62,7 @@ class World {
 
  private:
   friend class Settled;
+  friend class Stage;
 
   // Time
   void run_until(milliseconds end);
@@ -102,8 +107,9 @@ class World {
   void note(const std::string& words) const;
   void note_plan() const;
   [[nodiscard]] milliseconds now() const { return now_; }
+  /// The agenda's own clock stands at what happened last.
   void after_ms(std::uint64_t ms, Agenda::Action action) {
-    agenda_.after(milliseconds(ms), std::move(action));
+    agenda_.at(now_ + milliseconds(ms), std::move(action));
   }
 
   const Options options_;
@@ -133,6 +139,7 @@ class Settled {
   void check();
 
  private:
+  friend class Stage;
   struct Pair {
     const SimNode* from;
     const SimNode* to;

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <span>
+#include <string_view>
+
+#include "tests/sim/hubs/stage.hpp"
+
+namespace gimnet::sim::hubs {
+
+/// A world that must be among the simulated ones: its plan and what happens in it are written down.
+/// What must hold of all worlds is checked when it is over.
+struct Scene {
+  std::string_view name;
+  Plan (*plan)();
+  void (*play)(Stage& stage);
+  bool takes_long = false;  ///< a minute or so: `--long` alone plays it
+};
+[[nodiscard]] std::span<const Scene> scenes();
+
+}  // namespace gimnet::sim::hubs
