@@ -219,6 +219,7 @@ class Between(unittest.TestCase):
         removed = run_gimnet(f"unix:{second.socket_path}", "ctl", "link", "remove", first.url)
         self.assertEqual(removed.code, 0, removed.err)
         wait_until(lambda: self.states(second) == {second.url: "up"}, "the other link carries")
+        linked(second, 1)
         self.assertEqual(run_gimnet(second, "send", "B", data=b"two\n").code, 0)
         self.assertEqual((receiver.wait(), receiver.out), (0, b"one\ntwo\n"), receiver.err)
 
