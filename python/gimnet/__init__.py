@@ -15,13 +15,13 @@ from .bitestream import BitestreamError, Time
 from .errors import (BadArgument, BadName, BadVersion, Busy, Closed, Denied, Expired, Failed, Forked, GimnetError, Gone, Limit, NameTaken,
                      NoHost, NoHub, NoRight, NotConnected, NotDelivered, NotFound, NotRetained, NotTrusted, Protocol,
                      Refused, Silence, System, Taken, Timeout, TooLarge, WindowFull)
-from .messages import Event, Message, NodeRecord, Peer, ServiceRecord
+from .messages import Age, Event, Message, NodeRecord, Peer, ServiceRecord
 from .node import ConnectionEvent, ConnectionWatch, Node, Publisher, Source, State, Watch, connect
 from .requests import Answers, Pending, Reply, Request
 from .wait_set import WaitSet
 
 __all__ = [
-    "Answers", "BadArgument", "BadName", "BadVersion", "BitestreamError", "Busy", "Closed", "ConnectionEvent", "ConnectionWatch", "Denied", "Event", "Expired",
+    "Age", "Answers", "BadArgument", "BadName", "BadVersion", "BitestreamError", "Busy", "Closed", "ConnectionEvent", "ConnectionWatch", "Denied", "Event", "Expired",
     "Failed", "Forked", "GimnetError", "Gone", "Limit", "Message", "NameTaken", "NoHost", "NoHub", "NoRight", "Node", "NodeRecord", "NotConnected",
     "NotDelivered", "NotFound", "NotRetained", "NotTrusted", "Peer", "Pending", "Protocol", "Publisher", "Refused", "Reply",
     "Request", "ServiceRecord", "Silence",

@@ -55,6 +55,7 @@ GIMI_ACCEPTS = 1
 GIMI_BEGINS_STREAM = 0x01
 GIMI_PLAIN = 0x02
 GIMI_STAMPED = 0x08
+GIMI_AGED = 0x10
 GIMI_CONNECTED = 0
 GIMI_CONNECTION_LOST = 1
 GIMI_RESUMED = 2
@@ -188,6 +189,7 @@ class gimi_ready(ctypes.Structure):
 _HANDLE, _HANDLE_OUT = c_uint64, POINTER(c_uint64)
 # Those that answer a status, by their parameters.
 _STATUS_FUNCTIONS = {
+    "gimi_message_age": [POINTER(gimi_message), POINTER(c_int64), POINTER(c_int64)],
     "gimi_join": [POINTER(gimi_node_options), _HANDLE_OUT],
     "gimi_close": [_HANDLE],
     "gimi_state": [_HANDLE, POINTER(gimi_node_state)],

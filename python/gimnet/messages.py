@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import ctypes
 import importlib
+import time
 import weakref
 from dataclasses import dataclass
-from typing import Any, Dict, List, Mapping, Optional, Tuple
+from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Tuple
 
 from . import _c, bitestream, errors
 
-__all__ = ["Event", "Message", "NodeRecord", "Peer", "ServiceRecord"]
+__all__ = ["Age", "Event", "Message", "NodeRecord", "Peer", "ServiceRecord"]
 
 
 class Peer(int):
@@ -23,6 +24,13 @@ class Peer(int):
         return f"Peer({self})"
 
 
+class Age(NamedTuple):
+    """Seconds, by the clocks of the hubs. `error` is the part of this node: half of its shortest round trip."""
+
+    seconds: float
+    error: float
+
+
 class Message:
     """A message that was received. Immutable, and safe in every thread.
 
@@ -30,7 +38,7 @@ class Message:
     library's memory, which lives as long as any view of it. Times are in seconds since 1970.
     """
 
-    __slots__ = ("arrival", "begins_stream", "data", "key", "lane", "plain", "sender", "sent", "sequence", "service")
+    __slots__ = ("_born", "arrival", "begins_stream", "data", "key", "lane", "plain", "sender", "sent", "sequence", "service")
 
     def __init__(self, raw: Any, data: memoryview) -> None:
         self.data = data
@@ -44,6 +52,12 @@ class Message:
         self.lane = LANE_NAMES.get(raw.lane, f"unknown {raw.lane}")
         self.begins_stream = bool(raw.flags & _c.GIMI_BEGINS_STREAM)
         self.plain = bool(raw.flags & _c.GIMI_PLAIN)
+        self._born = _born(raw) if raw.flags & _c.GIMI_AGED else None
+
+    @property
+    def age(self) -> Optional[Age]:
+        """How long ago it was sent. None: not known; it is known of what is published with `age_max`."""
+        return Age((time.monotonic_ns() - self._born[0]) / 1e9, self._born[1] / 1e9) if self._born else None
 
     @property
     def value(self) -> Dict[bitestream.Key, Any]:
@@ -66,6 +80,13 @@ class Message:
 
     def __repr__(self) -> str:
         return f"<Message {self.sequence} of {self.service or str(self.sender)}, {len(self.data)} bytes>"
+
+
+def _born(raw: Any) -> Tuple[int, int]:
+    """When it was sent, by the clock of time.monotonic_ns(), and the error of that."""
+    age, error = ctypes.c_int64(), ctypes.c_int64()
+    errors.check(_c.lib.gimi_message_age(raw, age, error))
+    return time.monotonic_ns() - age.value, error.value
 
 
 def _view(address: int, size: int) -> Tuple[Any, memoryview]:

@@ -62,6 +62,19 @@ class Nodes(TwoNodes):
         with self.assertRaises(gimnet.Closed):
             subscription.receive()
 
+    def test_the_age_of_a_message(self):
+        publisher, subscription = self.pair("pulse", age_max=60.0)
+
+        def received():
+            publisher.publish("beat")
+            return subscription.receive(PATIENCE_S)
+        # The library knows the hub's clock once a PING was answered.
+        message = wait_until(lambda: next(filter(lambda each: each.age, [received()]), None), "the age of a message")
+        first, second = message.age, message.age
+        self.assertTrue(0 < first.seconds < second.seconds < PATIENCE_S and 0 < first.error < PATIENCE_S, (first, second))
+        publisher, subscription = self.pair("plain")
+        self.assertIsNone(received().age)
+
     def test_joins_under_the_next_number(self):
         with gimnet.connect("robot", hub=self.hub.url, number_if_taken=True) as second:
             self.assertEqual(second.name, "robot-2")
