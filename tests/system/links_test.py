@@ -289,11 +289,12 @@ class Between(unittest.TestCase):
     def test_nodes_of_a_hub_that_is_gone_are_unreachable(self):
         first = Hub(self, "--accept-links", hub_id=1)
         second = Hub(self, "--link", first.url, hub_id=2)
-        start_recv(self, first, "B")
+        start_gimnet(self, first, "answer", "B/add", "--echo")
 
         def state():
-            nodes = json.loads(run_gimnet(second, "nodes", "B", "--json").out or "[]")
-            return nodes[0]["state"] if nodes else None
+            found = [json.loads(run_gimnet(second, *words, "--json").out or "[]") for words in (("nodes", "B"), ("services", "B/add"))]
+            node, service = [each[0]["state"] if each else None for each in found]
+            return node if node == service else None
         wait_until(lambda: state() == "connected", "B at the other hub")
         first.process.signal(signal.SIGKILL)
         first.process.wait()

@@ -214,39 +214,42 @@ ExitCode run_nodes(ToolSession& session) {
 
 namespace {
 
-/// Places of nodes, as their hubs see them. A node that came or went between the two listings has
-/// no place.
-class PlaceIndex {
+/// Places and states of the nodes that have services. A node that came or went between the two
+/// listings has neither.
+class ProviderIndex {
  public:
-  explicit PlaceIndex(const std::vector<NodeRecord>& nodes) {
-    for (const NodeRecord& node : nodes) by_id_.emplace(node.node.id, node.place);
+  ProviderIndex(const std::vector<NodeRecord>& nodes, ToolSession& session) {
+    for (const NodeRecord& node : nodes)
+      by_id_[node.node.id] = {node.place, session.standing_of(node)};
   }
-  [[nodiscard]] std::string_view of(Peer node) const {
+  [[nodiscard]] Provider of(Peer node) const {
     const auto found = by_id_.find(node.id);
-    return found == by_id_.end() ? std::string_view() : found->second;
+    return found == by_id_.end() ? Provider{} : found->second;
   }
 
  private:
-  std::unordered_map<std::uint32_t, std::string> by_id_;
+  std::unordered_map<std::uint32_t, Provider> by_id_;
 };
 
-std::string json_of(const std::vector<ServiceRecord>& services, const PlaceIndex& places) {
+std::string json_of(const std::vector<ServiceRecord>& services, const ProviderIndex& providers) {
   JsonWriter json;
   json.begin_array();
-  for (const ServiceRecord& service : services) write(json, service, places.of(service.node));
+  for (const ServiceRecord& service : services) write(json, service, providers.of(service.node));
   return json.end_array().str() + "\n";
 }
 
-std::string table_of(const std::vector<ServiceRecord>& services, const PlaceIndex& places,
+std::string table_of(const std::vector<ServiceRecord>& services, const ProviderIndex& providers,
                      Paint paint) {
-  Table table({"NAME", "NODE", "HUB", "PLACE", "TYPE", "DIRECTION", "DELIVERY", "RETAIN",
+  Table table({"NAME", "NODE", "HUB", "STATE", "PLACE", "TYPE", "DIRECTION", "DELIVERY", "RETAIN",
                "SUBSCRIBERS", "METADATA"});
   for (const ServiceRecord& service : services) {
-    table.add({service.name, service.node.text(), service.hub_name,
-               std::string(places.of(service.node)),
+    const Provider provider = providers.of(service.node);
+    table.add({service.name, service.node.text(), service.hub_name, std::string(provider.state),
+               provider.place.empty() ? "-" : std::string(provider.place),
                std::to_string(service.key.type) + "/" + std::to_string(service.key.instance),
                direction_of(service), delivery_of(service), service.retain ? "yes" : "no",
-               std::to_string(service.subscribers), service.metadata});
+               std::to_string(service.subscribers), service.metadata},
+              provider.state == "connected" ? Tone::plain : Tone::warning);
   }
   return table.text(paint);
 }
@@ -263,9 +266,9 @@ ExitCode run_services(ToolSession& session) {
     if (!found) return session.fail(found.failure());
     nodes = std::move(*found);
   }
-  const PlaceIndex places(nodes);
-  session.output().write(session.options().json ? json_of(*services, places)
-                                                : table_of(*services, places, session.paint()));
+  const ProviderIndex providers(nodes, session);
+  session.output().write(session.options().json ? json_of(*services, providers)
+                                                : table_of(*services, providers, session.paint()));
   if (services->empty() && !session.options().target.empty())
     return session.fail_unmatched("service");
   return session.finish();

@@ -135,14 +135,14 @@ void write(JsonWriter& json, const NodeRecord& node, std::optional<std::string_v
   json.member("joined_ms", node.joined_ms).member("services", node.services).end_object();
 }
 
-void write(JsonWriter& json, const ServiceRecord& service, std::optional<std::string_view> place) {
+void write(JsonWriter& json, const ServiceRecord& service, std::optional<Provider> provider) {
   json.begin_object().member("name", service.name).member("node", service.node.text());
   json.member("type", service.key.type).member("instance", service.key.instance);
   json.member("direction", direction_of(service)).member("delivery", delivery_of(service));
   json.member("retain", service.retain);
   json.member("group", service.group_id).member("subscribers", service.subscribers);
   json.member("metadata", service.metadata).member("hub", service.hub_name);
-  if (place) json.member("place", *place);
+  if (provider) json.member("place", provider->place).member("state", provider->state);
   json.end_object();
 }
 

@@ -60,9 +60,14 @@ class JsonWriter {
 /// `state`: as ToolSession::standing_of(), where it is known.
 void write(JsonWriter& json, const NodeRecord& node,
            std::optional<std::string_view> state = std::nullopt);
-/// `place`: that of its node, where it is known.
+/// The node that has a service: its place, and its state as ToolSession::standing_of().
+struct Provider {
+  std::string_view place;
+  std::string_view state = "-";
+};
+/// `provider`: where it is known.
 void write(JsonWriter& json, const ServiceRecord& service,
-           std::optional<std::string_view> place = std::nullopt);
+           std::optional<Provider> provider = std::nullopt);
 
 /// "provides", "accepts", or "answers" of one that answers requests.
 [[nodiscard]] const char* direction_of(const ServiceRecord& service);

@@ -75,8 +75,9 @@ TEST(RecordJson, OfAService) {
       << json.str();
   EXPECT_EQ(json.str().find("place"), std::string::npos) << "it is not known here";
   JsonWriter placed;
-  write(placed, service, "127.0.0.1:4000");
-  EXPECT_TRUE(placed.str().ends_with(R"("hub":"lab","place":"127.0.0.1:4000"})")) << placed.str();
+  write(placed, service, Provider{"127.0.0.1:4000", "away"});
+  EXPECT_TRUE(placed.str().ends_with(R"("hub":"lab","place":"127.0.0.1:4000","state":"away"})"))
+      << placed.str();
   service.direction = Direction::accepts;
   EXPECT_STREQ(direction_of(service), "accepts");
   service.key.type = GIMI_REQUEST_TYPE;
