@@ -218,9 +218,10 @@ class Between(unittest.TestCase):
         self.assertEqual(run_gimnet(second, "send", "B", data=b"one\n").code, 0)
         removed = run_gimnet(f"unix:{second.socket_path}", "ctl", "link", "remove", first.url)
         self.assertEqual(removed.code, 0, removed.err)
-        wait_until(lambda: self.states(second) == {second.url: "up"}, "the other link carries")
-        linked(second, 1)
-        self.assertEqual(run_gimnet(second, "send", "B", data=b"two\n").code, 0)
+        wait_until(lambda: self.states(second) == {second.url: "up"}, "the other link takes over")
+        wait_until(lambda: run_gimnet(second, "ping", "B", "-c", "1").code == 0, "the other link carries frames")
+        sent = run_gimnet(second, "send", "B", data=b"two\n")
+        self.assertEqual(sent.code, 0, sent.err)
         self.assertEqual((receiver.wait(), receiver.out), (0, b"one\ntwo\n"), receiver.err)
 
     def test_a_link_that_may_not_speak_for_a_hub(self):
