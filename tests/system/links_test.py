@@ -233,6 +233,7 @@ class Between(unittest.TestCase):
         second = Hub(self, "--accept-links", "--link", first.url, hub_id=2)
         third = Hub(self, "--link", second.url, hub_id=3)
         linked(third, 1)
+        linked(first, 3, "a route back")
         start_recv(self, first, "B")
         there = first.wait_for_node("B")["id"]
         self.assertEqual(run_gimnet(third, "ping", there, "-c", "1").code, 0)

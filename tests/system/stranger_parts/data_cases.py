@@ -65,7 +65,8 @@ class Data(Case):
         hub = self.hub()
         one, two = self.stranger(hub), self.stranger(hub)
         trace = struct.pack("<BB", 1, 28) + struct.pack("<B3x", 0) + bytes(24)
-        age = struct.pack("<BBqI", 2, 12, time.time_ns(), 3_600_000)
+        # A second ago: the hub would write its own time into an origin that is in the future by its clock.
+        age = struct.pack("<BBqI", 2, 12, time.time_ns() - 1_000_000_000, 3_600_000)
         unknown = b"\xc8\x02hi"
         extensions = trace + age + unknown
         body = struct.pack("<H", len(extensions)) + extensions + struct.pack("<II", 5, 6) + b"data"
