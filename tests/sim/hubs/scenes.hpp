@@ -7,8 +7,8 @@
 
 namespace gimnet::sim::hubs {
 
-/// A world that must be among the simulated ones: its plan and what happens in it are written down.
-/// What must hold of all worlds is checked when it is over.
+/// A world that must be among the simulated ones: its plan and its events are written down. At its
+/// end the same is checked as in every world.
 struct Scene {
   std::string_view name;
   Plan (*plan)();
