@@ -55,6 +55,7 @@ bool ConnectionReader::handle_from_link(Connection& connection, const proto::Run
       pass_on_flow(connection, view);
       return true;
     case Admission::control:
+      if (view.size == proto::kHeaderSize) break;  // it names no operation
       if (connection.link->control.take(kControlFrames, std::chrono::milliseconds{state_.now_ms})) {
         ControlFrameEvent event{connection.session(), connection.attachment, connection.node, {}};
         event.frame.assign(view.bytes, view.bytes + view.size);

@@ -159,6 +159,10 @@ TEST(LinkReader, WhoSpeaksForThisHubIsDroppedAndTheLinkStays) {
   rig.settle();
   EXPECT_EQ(rig.dropped(DropReason::wrong_source), 2u);
   EXPECT_EQ(headers_told(), 0) << "at most once a second";
+  rig.write(link, frame_after(0, 0, "", {.kind = Kind::route}));
+  rig.settle();
+  EXPECT_EQ(headers_told(), 0) << "a request without an operation is none";
+  EXPECT_EQ(rig.sum(&ShardCounters::malformed), 1u);
 }
 
 TEST(LinkReader, AFrameThatIsNotUnderstoodIsDroppedAndTheLinkStays) {
