@@ -171,25 +171,14 @@ TEST(LinkReader, AFrameThatIsNotUnderstoodIsDroppedAndTheLinkStays) {
   FakeNode& link = rig.link(0, kNear);
   rig.write(link, frame_after(0, node.id.value(), "flag", {.flags = 0x40}));
   rig.write(link, frame_after(0, node.id.value(), "short", {.flags = proto::kFlagFragment}));
+  rig.write(link, frame_after(0, node.id.value(), "no key", {.flags = proto::kFlagKeyed}));
   rig.write(link, frame_after(0, node.id.value(), "kind", {.kind = static_cast<Kind>(99)}));
   rig.write(link, frame_after(0, node.id.value(), "good"));
   rig.settle();
   EXPECT_THAT(node.texts(), ElementsAre("good"));
   EXPECT_FALSE(link.goodbye);
-  EXPECT_EQ(rig.dropped(DropReason::malformed), 2u) << "a kind that nobody knows is no data";
+  EXPECT_EQ(rig.dropped(DropReason::malformed), 3u) << "a kind that nobody knows is no data";
   EXPECT_TRUE(rig.ledger().exact());
-}
-
-TEST(LinkReader, AFrameWithoutRoomForItsKeyIsDroppedAlone) {
-  HubRig rig;
-  FakeNode& node = rig.join(0);
-  FakeNode& link = rig.link(0, kNear);
-  rig.write(link, frame_after(0, node.id.value(), "no key", {.flags = proto::kFlagKeyed}));
-  rig.write(link, frame_after(0, node.id.value(), "good"));
-  rig.settle();
-  EXPECT_THAT(node.texts(), ElementsAre("good"));
-  EXPECT_EQ(rig.dropped(DropReason::malformed), 1u);
-  EXPECT_FALSE(link.goodbye);
 }
 
 TEST(LinkReader, AReportNeverGoesBack) {
