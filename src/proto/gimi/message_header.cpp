@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "base/endian.hpp"
+#include "proto/gimi/request.hpp"
 
 namespace gimnet::proto::gimi {
 
@@ -39,8 +40,8 @@ std::optional<MessageView> parse_message(std::span<const std::byte> payload) {
 std::uint32_t application_bytes(bool keyed, std::span<const std::byte> start, std::uint32_t size) {
   if (!keyed || start.size() < kMessageHeaderSize) return size;
   const MessageHeader header = load_message_header(start.data());
-  const std::uint32_t prefix =
-      static_cast<std::uint32_t>(kMessageHeaderSize) + header.extension_bytes;
+  std::uint32_t prefix = static_cast<std::uint32_t>(kMessageHeaderSize) + header.extension_bytes;
+  if (header.operation == MessageOperation::request) prefix += kRequestPrefix;
   return header.operation <= MessageOperation::pong && prefix <= size ? size - prefix : size;
 }
 

@@ -76,7 +76,7 @@ struct MessageView {
 [[nodiscard]] std::optional<MessageView> parse_message(std::span<const std::byte> payload);
 
 /// Bytes of the application in a message of `size` bytes, of which `start` is the beginning: all
-/// but the GIMI header and its extension, which a KEYED message has.
+/// but the GIMI header and its extension, which a KEYED message has, and the time of a REQUEST.
 [[nodiscard]] std::uint32_t application_bytes(bool keyed, std::span<const std::byte> start,
                                               std::uint32_t size);
 

@@ -59,6 +59,16 @@ TEST(GimiMessage, PrefixIsWrittenAsTheVectorsSay) {
   }
 }
 
+TEST(GimiMessage, TellsTheBytesOfTheApplication) {
+  const auto data = payload_of("gimi/data_extension");
+  EXPECT_EQ(application_bytes(true, data, 1'000), 1'000 - (data.size() - 2));
+  EXPECT_EQ(application_bytes(false, data, 1'000), 1'000u);
+  const auto request = payload_of("gimi/request");
+  const auto body = decode_request(parse_message(request)->data);
+  EXPECT_EQ(application_bytes(true, request, static_cast<std::uint32_t>(request.size())),
+            body->data.size());
+}
+
 TEST(GimiMessage, RefusesWhatDoesNotFit) {
   auto payload = payload_of("gimi/data");
   EXPECT_FALSE(parse_message(std::span(payload).first(kMessageHeaderSize - 1)));
