@@ -78,6 +78,11 @@ class ByteBuffer {
 
   /// Forgets the bytes and keeps the memory.
   void clear() { size_ = 0; }
+  /// From now on, the byte number `aligned_at` is aligned. REQUIRES: empty().
+  void align(std::size_t aligned_at) {
+    aligned_at_ = aligned_at;
+    begin_ = -(reinterpret_cast<std::uintptr_t>(block_) + aligned_at) % kAlignment;
+  }
 
  private:
   static constexpr std::size_t kFirstGrowth = 256;

@@ -79,6 +79,24 @@ TEST(ByteBuffer, KeepsItsMemoryWhenCleared) {
   EXPECT_EQ(buffer.capacity(), capacity);
 }
 
+TEST(ByteBuffer, AlignsAnotherByteInTheSameMemory) {
+  ByteBuffer buffer(12);
+  ASSERT_TRUE(buffer.append(bytes(std::string(1'000, 'a'))));
+  const std::size_t capacity = buffer.capacity();
+  for (const std::size_t aligned_at : {0u, 20u, 24u}) {
+    buffer.clear();
+    buffer.align(aligned_at);
+    const std::string text_of(capacity, 'b');
+    ASSERT_TRUE(buffer.append(bytes(text_of)));
+    EXPECT_EQ((reinterpret_cast<std::uintptr_t>(buffer.data()) + aligned_at) % 64, 0u);
+    EXPECT_TRUE(text(buffer) == text_of);
+    EXPECT_EQ(buffer.capacity(), capacity) << "as it fits";
+  }
+  ByteBuffer none;
+  none.align(20);
+  EXPECT_TRUE(none.empty());
+}
+
 TEST(ByteBuffer, SaysWhenThereIsNoMemory) {
   ByteBuffer buffer;
   ASSERT_TRUE(buffer.append(bytes("GIMnet")));

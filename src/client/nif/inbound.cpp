@@ -211,6 +211,7 @@ void Inbound::add_whole(const proto::FrameView& view, const std::byte* frame, By
   auto record = std::make_unique<Record>();
   record->incoming = incoming_of({nullptr, frame, arrival_.wall_ns, 0, 0});
   record->payload = std::move(payload);
+  record->spares = assembler_.spares();
   record->extensions.assign(view.extensions.begin(), view.extensions.end());
   record->incoming.epoch = epoch_of(view.header);
   record->finish();
@@ -232,7 +233,7 @@ void Inbound::add_frame(const proto::FrameView& view, const std::byte* frame) {
   // Other libraries may send larger ones in one piece. Data of this size are aligned.
   const auto size = static_cast<std::uint32_t>(view.payload.size());
   if (size > proto::kUncutMessageMax) {
-    ByteBuffer copy(data_begin(view, size));
+    ByteBuffer copy = assembler_.spares()->take(size, data_begin(view, size));
     if (copy.reserve(size) && copy.append(view.payload))
       return add_whole(view, frame, std::move(copy));
   }

@@ -1,5 +1,7 @@
 #include "client/nif/message_assembler.hpp"
 
+#include <utility>
+
 #include "proto/gimi/message_header.hpp"
 
 namespace gimnet::nif {
@@ -56,10 +58,12 @@ std::optional<proto::Taken> MessageAssembler::progress(const proto::FrameView& v
 
 MessageAssembler::Step MessageAssembler::take(const proto::FrameView& view, std::int64_t now_ns) {
   const proto::FragmentHeader& fragment = *view.fragment;
-  const std::size_t aligned_at = fragment.offset == 0 ? data_begin(view, fragment.total) : 0;
-  Step step{
-      reassembler_.take(proto::FragmentStream::of(view.header), fragment, view.payload, aligned_at),
-      std::nullopt};
+  ByteBuffer memory;
+  if (fragment.offset == 0 && view.payload.size() < fragment.total)
+    memory = spares_->take(fragment.total, data_begin(view, fragment.total));
+  Step step{reassembler_.take(proto::FragmentStream::of(view.header), fragment, view.payload,
+                              std::move(memory)),
+            std::nullopt};
   using State = proto::Reassembled::State;
   if (!has_window(view)) return step;
   if (step.reassembled.state == State::part || step.reassembled.state == State::whole) {

@@ -2,10 +2,12 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <unordered_map>
 #include <vector>
 
+#include "client/nif/spare_buffers.hpp"
 #include "client/nif/window_tuning.hpp"
 #include "proto/frame/frame_parser.hpp"
 #include "proto/frame/reassembler.hpp"
@@ -24,6 +26,9 @@ class MessageAssembler {
  public:
   explicit MessageAssembler(const proto::ReassemblyLimits& limits)
       : limits_(limits), reassembler_(limits) {}
+
+  /// Memory for large messages, to which their records give it back.
+  [[nodiscard]] const std::shared_ptr<SpareBuffers>& spares() const { return spares_; }
 
   /// The news for the sender of a message.
   struct Notice {
@@ -66,6 +71,7 @@ class MessageAssembler {
   /// Messages that ended without a word to this end leave their windows behind.
   void forget_ended();
 
+  const std::shared_ptr<SpareBuffers> spares_ = std::make_shared<SpareBuffers>();
   const proto::ReassemblyLimits limits_;
   proto::Reassembler reassembler_;
   std::unordered_map<std::uint64_t, OpenMessage> windows_;  ///< by sender and message number

@@ -6,9 +6,11 @@
 #include <memory>
 #include <new>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/byte_buffer.hpp"
+#include "client/nif/spare_buffers.hpp"
 #include "gimnet/nif.h"
 
 namespace gimnet::nif {
@@ -75,11 +77,16 @@ struct WatchedChange {
 /// One thing that is not a frame in a slab: an event, or a message put together from fragments.
 class Record final : public Storage {
  public:
+  Record() = default;
+  ~Record() override {
+    if (spares) spares->give(std::move(payload));
+  }
   nif_incoming incoming{};
   std::string text;
   ByteBuffer payload;
   std::vector<std::byte> extensions;
   std::unique_ptr<WatchedChange> watched;
+  std::shared_ptr<SpareBuffers> spares;  ///< get the payload's memory in the end
 
   /// Points the members of `incoming` at what is stored here.
   void finish() {

@@ -21,7 +21,7 @@ std::size_t Reassembler::StreamHash::operator()(const FragmentStream& stream) co
 }
 
 Reassembled Reassembler::take(const FragmentStream& stream, const FragmentHeader& fragment,
-                              std::span<const std::byte> payload, std::size_t aligned_at) {
+                              std::span<const std::byte> payload, ByteBuffer memory) {
   const std::uint64_t lost_before = lost_messages_;
   Entry& entry = touch(stream);
   Reassembled result;
@@ -30,7 +30,7 @@ Reassembled Reassembler::take(const FragmentStream& stream, const FragmentHeader
     result = follows ? append(entry, payload) : refuse(entry, fragment.message, State::lost);
   } else {
     lose(entry);
-    result = fragment.offset == 0 ? begin(entry, fragment, payload, aligned_at)
+    result = fragment.offset == 0 ? begin(entry, fragment, payload, std::move(memory))
                                   : refuse(entry, fragment.message, State::lost);
   }
   result.lost_messages =
@@ -150,7 +150,7 @@ bool Reassembler::make_room(const Entry& keep, std::size_t bytes) {
 }
 
 Reassembled Reassembler::begin(Entry& entry, const FragmentHeader& fragment,
-                               std::span<const std::byte> payload, std::size_t aligned_at) {
+                               std::span<const std::byte> payload, ByteBuffer memory) {
   if (fragment.total > limits_.message_bytes_max)
     return refuse(entry, fragment.message, State::too_large);
   if (payload.size() == fragment.total) {
@@ -159,7 +159,7 @@ Reassembled Reassembler::begin(Entry& entry, const FragmentHeader& fragment,
   entry.open = true;
   entry.message = fragment.message;
   entry.total = fragment.total;
-  entry.bytes = ByteBuffer(aligned_at);
+  entry.bytes = std::move(memory);
   ++open_messages_;
   return append(entry, payload);
 }

@@ -62,9 +62,9 @@ class Reassembler {
   /// If a limit is reached, the source that holds most of the room loses the message that waited
   /// longest for its next fragment.
   /// REQUIRES: the fragment fits its own total, as parse_frame() checks.
-  /// `aligned_at`: of a first fragment, the byte of the message that shall be aligned (ByteBuffer).
+  /// `memory`: of a first fragment, an empty buffer for the message.
   [[nodiscard]] Reassembled take(const FragmentStream& stream, const FragmentHeader& fragment,
-                                 std::span<const std::byte> payload, std::size_t aligned_at = 0);
+                                 std::span<const std::byte> payload, ByteBuffer memory = {});
 
   /// An unfragmented message came in the stream: an unfinished one before it is lost. Returns
   /// messages lost, 0 or 1.
@@ -116,7 +116,7 @@ class Reassembler {
   void displace(Entry& entry);
   bool make_room(const Entry& keep, std::size_t bytes);
   Reassembled begin(Entry& entry, const FragmentHeader& fragment,
-                    std::span<const std::byte> payload, std::size_t aligned_at);
+                    std::span<const std::byte> payload, ByteBuffer memory);
   Reassembled append(Entry& entry, std::span<const std::byte> payload);
   Reassembled refuse(Entry& entry, std::uint32_t message, Reassembled::State state);
 

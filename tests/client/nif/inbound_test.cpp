@@ -127,7 +127,6 @@ TEST(Inbound, PutsFragmentsTogetherAndTellsOfLoss) {
 
 /// A large message of that operation comes in pieces and in one.
 void expect_aligned(char operation, std::size_t before_data) {
-  SCOPED_TRACE(static_cast<int>(operation));
   std::string payload(20'000, 'x');
   payload[8] = operation;
   payload[9] = 0;
@@ -147,7 +146,7 @@ void expect_aligned(char operation, std::size_t before_data) {
     ASSERT_EQ(receiving.feed(bytes), Inbound::Verdict::going);
     ASSERT_EQ(receiving.host.items.size(), 2u) << piece;
     const auto address = reinterpret_cast<std::uintptr_t>(receiving.host.items[1].payload);
-    EXPECT_EQ((address + before_data) % 64, 0u) << piece;
+    EXPECT_EQ((address + before_data) % 64, 0u) << int{operation} << ' ' << piece;
     EXPECT_TRUE(receiving.host.texts()[1] == payload) << piece;
     EXPECT_EQ(receiving.host.items[1].key, 99u);
   }

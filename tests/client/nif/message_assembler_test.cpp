@@ -3,7 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <utility>
 #include <vector>
+
+#include "client/nif/storage.hpp"
 
 namespace gimnet::nif::test {
 namespace {
@@ -34,6 +37,33 @@ std::vector<proto::Taken> take_paced(MessageAssembler& assembler, std::int64_t p
     told.push_back(step.notice->taken);
   }
   return told;
+}
+
+TEST(MessageAssembler, PutsAMessageWhereAnEarlierOneWas) {
+  MessageAssembler assembler({});
+  std::vector<const void*> places;
+  for (const char letter : {'a', 'b'}) {
+    const std::string half(kPiece, letter);
+    const auto message = static_cast<std::uint32_t>(letter);
+    static_cast<void>(assembler.take(piece(message, 0, 2 * kPiece, half), 1));
+    auto whole = assembler.take(piece(message, kPiece, 2 * kPiece, half), 2).reassembled;
+    ASSERT_EQ(whole.state, proto::Reassembled::State::whole);
+    EXPECT_EQ(std::to_integer<char>(whole.message.back()), letter);
+    places.push_back(whole.storage.data());
+    Record record;
+    record.payload = std::move(whole.storage);
+    record.spares = assembler.spares();
+  }
+  EXPECT_EQ(places[0], places[1]);
+}
+
+TEST(MessageAssembler, DoesNotWasteThatMemoryOnAMessageInOnePiece) {
+  MessageAssembler assembler({});
+  ByteBuffer memory;
+  ASSERT_TRUE(memory.reserve(2 * kPiece));
+  assembler.spares()->give(std::move(memory));
+  static_cast<void>(assembler.take(piece(1, 0, kPiece, std::string(kPiece, 'x')), 1));
+  EXPECT_EQ(assembler.spares()->bytes(), 2 * kPiece);
 }
 
 TEST(MessageAssembler, TheWindowGrowsWhereMessagesComeFast) {
