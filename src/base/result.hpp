@@ -21,6 +21,10 @@ class [[nodiscard]] Result {
   // Implicit, so that a function says `return value;` or `return error;`.
   Result(T value) : state_(std::in_place_index<0>, std::move(value)) {}
   Result(E error) : state_(std::in_place_index<1>, std::move(error)) {}
+  /// The value of those arguments, made where it stays: for large ones on the data path.
+  template <class... Arguments>
+  explicit Result(std::in_place_t /*here*/, Arguments&&... arguments)
+      : state_(std::in_place_index<0>, std::forward<Arguments>(arguments)...) {}
 
   [[nodiscard]] bool has_value() const { return state_.index() == 0; }
   [[nodiscard]] explicit operator bool() const { return has_value(); }

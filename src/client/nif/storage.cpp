@@ -1,15 +1,15 @@
 #include "client/nif/storage.hpp"
 
+#include "base/endian.hpp"
 #include "proto/frame/frame_parser.hpp"
 
 namespace gimnet::nif {
 namespace {
 
-/// Nothing stands between header and payload, as in most frames: they need not be taken apart
+/// At most a key stands between header and payload, as in most frames: they need not be taken apart
 /// again.
 bool is_plain(const proto::FrameHeader& header) {
-  return header.kind != proto::Kind::list &&
-         !header.has(proto::kFlagExt | proto::kFlagFragment | proto::kFlagKeyed);
+  return header.kind != proto::Kind::list && !header.has(proto::kFlagExt | proto::kFlagFragment);
 }
 
 }  // namespace
@@ -30,11 +30,18 @@ nif_incoming incoming_of(const Item& item) {
   in.text = "";
   in.storage = item.storage;
   if (is_plain(header)) {
-    in.payload = item.frame + proto::kHeaderSize;
+    const std::byte* payload = item.frame + proto::kHeaderSize;
     in.size = header.length;
+    if (header.has(proto::kFlagKeyed)) {
+      in.key = load_le<std::uint64_t>(payload);
+      in.flags |= NIF_FLAG_KEYED;
+      payload += proto::kKeySize;
+      in.size -= proto::kKeySize;
+    }
+    in.payload = payload;
     return in;
   }
-  // The frame was checked when it was taken, so its own length bounds it and it parses again.
+  // As the frame was checked when it was taken, its own length bounds it and it parses again.
   const auto parsed = proto::parse_frame({item.frame, header.frame_size()}, proto::Origin::hub);
   if (!parsed) return in;
   in.payload = parsed->payload.data();

@@ -33,35 +33,23 @@ class Rest {
   std::span<const std::byte> bytes_;
 };
 
-FrameError take_recipients(Rest& rest, FrameView& view) {
-  const std::size_t bytes = std::size_t{4} * view.header.dst;
+FrameError take_recipients(Rest& rest, std::uint32_t count, ListIds& recipients) {
+  const std::size_t bytes = std::size_t{4} * count;
   if (!rest.has(bytes)) return FrameError::list_too_short;
-  const ListIds ids(rest.take(bytes).data(), view.header.dst);
+  const ListIds ids(rest.take(bytes).data(), count);
   for (std::uint32_t i = 1; i < ids.size(); ++i) {
     if (ids[i] <= ids[i - 1]) return FrameError::list_not_ascending;
   }
-  view.recipients = ids;
+  recipients = ids;
   return FrameError::none;
 }
 
-FrameError take_extensions(Rest& rest, FrameView& view) {
+FrameError take_extensions(Rest& rest, std::span<const std::byte>& extensions) {
   if (!rest.has(kExtensionsPrefixSize)) return FrameError::ext_too_short;
   const auto bytes = load_le<std::uint16_t>(rest.take(kExtensionsPrefixSize).data());
   if (!rest.has(bytes)) return FrameError::ext_too_short;
-  view.extensions = rest.take(bytes);
-  return valid_extensions(view.extensions) ? FrameError::none : FrameError::ext_too_short;
-}
-
-FrameError take_fragment_and_key(Rest& rest, FrameView& view) {
-  if (view.header.has(kFlagFragment)) {
-    if (!rest.has(kFragmentHeaderSize)) return FrameError::fragment_too_short;
-    view.fragment = load_fragment_header(rest.take(kFragmentHeaderSize).data());
-  }
-  if (view.header.has(kFlagKeyed)) {
-    if (!rest.has(kKeySize)) return FrameError::key_too_short;
-    view.key = load_le<std::uint64_t>(rest.take(kKeySize).data());
-  }
-  return FrameError::none;
+  extensions = rest.take(bytes);
+  return valid_extensions(extensions) ? FrameError::none : FrameError::ext_too_short;
 }
 
 FrameError check_fragment(const FragmentHeader& fragment, std::size_t payload_size) {
@@ -77,18 +65,6 @@ FrameError check_header(const FrameHeader& header, Origin origin) {
     return FrameError::unknown_kind;
   if (header.kind == Kind::list && header.dst > kListRecipientsMax) return FrameError::list_count;
   return FrameError::none;
-}
-
-FrameError take_apart(Rest& rest, FrameView& view) {
-  if (view.header.kind == Kind::list) {
-    if (const auto error = take_recipients(rest, view); error != FrameError::none) return error;
-  }
-  if (view.header.has(kFlagExt)) {
-    if (const auto error = take_extensions(rest, view); error != FrameError::none) return error;
-  }
-  if (const auto error = take_fragment_and_key(rest, view); error != FrameError::none) return error;
-  view.payload = rest.all();
-  return view.fragment ? check_fragment(*view.fragment, view.payload.size()) : FrameError::none;
 }
 
 }  // namespace
@@ -110,14 +86,39 @@ std::uint32_t count_equal_fours(const std::byte* next, std::size_t available,
 
 Result<FrameView, FrameError> parse_frame(std::span<const std::byte> frame, Origin origin) {
   if (frame.size() < kHeaderSize) return FrameError::incomplete;
-  FrameView view;
-  view.header = load_header(frame.data());
-  if (const auto error = check_header(view.header, origin); error != FrameError::none) return error;
-  if (frame.size() < view.header.frame_size()) return FrameError::incomplete;
-  view.after_header = frame.subspan(kHeaderSize, view.header.length);
-  Rest rest(view.after_header);
-  if (const auto error = take_apart(rest, view); error != FrameError::none) return error;
-  return view;
+  const FrameHeader header = load_header(frame.data());
+  if (const auto error = check_header(header, origin); error != FrameError::none) return error;
+  if (frame.size() < header.frame_size()) return FrameError::incomplete;
+  const auto after_header = frame.subspan(kHeaderSize, header.length);
+  Rest rest(after_header);
+  // Put together at the end: a view that is filled in bit by bit is first set to zeros as a whole,
+  // which took longer than all else here.
+  ListIds recipients;
+  std::span<const std::byte> extensions;
+  std::optional<FragmentHeader> fragment;
+  std::optional<std::uint64_t> key;
+  if (header.kind == Kind::list) {
+    const FrameError error = take_recipients(rest, header.dst, recipients);
+    if (error != FrameError::none) return error;
+  }
+  if (header.has(kFlagExt)) {
+    const FrameError error = take_extensions(rest, extensions);
+    if (error != FrameError::none) return error;
+  }
+  if (header.has(kFlagFragment)) {
+    if (!rest.has(kFragmentHeaderSize)) return FrameError::fragment_too_short;
+    fragment = load_fragment_header(rest.take(kFragmentHeaderSize).data());
+  }
+  if (header.has(kFlagKeyed)) {
+    if (!rest.has(kKeySize)) return FrameError::key_too_short;
+    key = load_le<std::uint64_t>(rest.take(kKeySize).data());
+  }
+  if (fragment) {
+    const FrameError error = check_fragment(*fragment, rest.all().size());
+    if (error != FrameError::none) return error;
+  }
+  return Result<FrameView, FrameError>(std::in_place, header, recipients, extensions, fragment, key,
+                                       rest.all(), after_header);
 }
 
 }  // namespace gimnet::proto
