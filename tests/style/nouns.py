@@ -6,6 +6,8 @@ from tree import CPP_SUFFIXES, HEADER_SUFFIXES
 
 SMALL_HEADER_LINES = 40
 SMALL_HEADER_USERS = 3
+# Older than the rule; the list may only shrink.
+SLICED_CLASSES = ("ConnectionReader", "Membership", "Node", "Outbound", "Outbox", "Services")
 
 # In formatted code a type of a namespace begins its line. The head ends at "{"; at ";" it only declares.
 _TYPE = re.compile(r"^(?:template <[^{;]*>\s+)?(?:class|struct|union|enum(?: class)?) "
@@ -39,3 +41,23 @@ def class_names_exist_once(tree):
             if match[1] in places:
                 yield f"{place}: {match[1]} is the name of a type in {places[match[1]]} already"
             places.setdefault(match[1], place)
+
+
+# A member function that a file defines outside of its class: the classes that it is named with.
+_MEMBER = re.compile(r"^(?![\s#}/])[^;{}()=]*?(?<![\w:])((?:[a-z]\w*::)*(?:[A-Z]\w*(?:<[^<>()]*>)?::)+)"
+                     r"(?:~?\w+|operator[^\s\w]+|operator \w[^()]*)\([^;{]*\{", re.MULTILINE)
+
+
+def class_in_one_source(tree):
+    """The member functions of a class stand in one source. Two sources are a class cut into slices: the second one
+    wants to be a class. A nested class may have a source of its own."""
+    sources = {}
+    for file in tree.files(("src",), CPP_SUFFIXES):
+        for match in _MEMBER.finditer("\n".join(file.code_lines())):
+            name = re.sub(r"<[^<>]*>", "", match[1])[:-2]
+            sources.setdefault(name, {}).setdefault(file.path.rsplit(".", 1)[0], file.path)
+    for name, found in sources.items():
+        if len(found) > 1 and name not in SLICED_CLASSES:
+            yield f"{name} has its functions in {' and '.join(found.values())}: find the second class in it"
+        if len(found) == 1 and name in SLICED_CLASSES:
+            yield f"{next(iter(found.values()))}: {name} is whole: take it off SLICED_CLASSES"
