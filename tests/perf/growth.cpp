@@ -106,14 +106,21 @@ std::vector<std::string> colliding_names(std::size_t count) {
 }
 
 Work names(std::size_t count) {
-  auto directory = std::make_shared<Directory>();
+  struct Hub {
+    Limits limits;
+    Sessions sessions{{}, limits};
+    Services services{HubId{1}, limits};
+    Directory directory{sessions, services};
+  };
+  auto hub = std::make_shared<Hub>();
   auto all = std::make_shared<std::vector<std::string>>(colliding_names(count));
-  return [directory, all] {
-    for (const std::string& name : *all) directory->put(name, NodeIndex{1});
+  return [hub, all] {
+    Directory& directory = hub->directory;
+    for (const std::string& name : *all) directory.put(name, NodeIndex{1});
     for (const std::string& name : *all) {
-      if (!directory->find(name)) wrong("a name was lost");
+      if (!directory.find(name)) wrong("a name was lost");
     }
-    for (const std::string& name : *all) directory->remove(name);
+    for (const std::string& name : *all) directory.remove(name);
   };
 }
 

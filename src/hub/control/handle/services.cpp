@@ -100,7 +100,7 @@ Result<ns::AdvertiseAnswer, proto::Refusal> advertise(HandlerContext& context,
       context.membership.services().provided(session.index, full_name);
   if (auto refusal = fault_of(context.limits, offer, standing)) return *refusal;
   if (standing == nullptr) {
-    if (auto refusal = context.membership.service_name_refusal(full_name)) return *refusal;
+    if (auto refusal = context.membership.directory().service_refusal(full_name)) return *refusal;
   }
   ServiceTerms terms;
   terms.message_type = offer.message_type;

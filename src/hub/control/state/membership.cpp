@@ -27,7 +27,10 @@ Places places_for(const JoinRequest& request) {
 }  // namespace
 
 Membership::Membership(const Sessions::Options& options, const Limits& limits)
-    : limits_(limits), sessions_(options, limits), services_(options.hub, limits, options.groups) {}
+    : limits_(limits),
+      sessions_(options, limits),
+      services_(options.hub, limits, options.groups),
+      directory_(sessions_, services_) {}
 
 Result<Membership::Joined, proto::Goodbye> Membership::join(const JoinRequest& request,
                                                             milliseconds now, Effects& effects) {
@@ -35,8 +38,8 @@ Result<Membership::Joined, proto::Goodbye> Membership::join(const JoinRequest& r
   const Sessions::Claim claim =
       sessions_.claim({request.token, request.name, request.identity, request.wall});
   if (!request.name.empty()) {
-    if (std::optional<proto::Goodbye> refusal =
-            name_refusal(request.name, claim.session, request, now)) {
+    if (std::optional<proto::Goodbye> refusal = directory_.refusal(
+            request.name, {claim.session, request.former, request.had_name}, now)) {
       return std::move(*refusal);
     }
   }
@@ -117,7 +120,7 @@ std::optional<proto::Refusal> Membership::rename(Session& session, const std::st
                                                  milliseconds now, Effects& effects) {
   if (name == session.name) return std::nullopt;
   if (!name.empty()) {
-    if (const std::optional<proto::Goodbye> refusal = name_refusal(name, &session, {}, now)) {
+    if (const std::optional<proto::Goodbye> refusal = directory_.refusal(name, {&session}, now)) {
       const proto::Status status = refusal->code == GoodbyeCode::name_taken ? proto::Status::taken
                                    : refusal->code == GoodbyeCode::hub_full
                                        ? proto::Status::limit
@@ -168,38 +171,10 @@ void Membership::state_kept(const Durable& durable) {
   services_.group_indices().grant(durable.groups);
 }
 
-std::optional<proto::Refusal> Membership::take_for(const Session& session, NodeIndex index,
-                                                   milliseconds now, const KeepNow& keep) {
-  if (index.value() == kHubIndex || index.value() >= kEveryIndex) {
-    return proto::Refusal{proto::Status::bad_request,
-                          "a node's id ends in a number from 1 to " + std::to_string(kIndexMost)};
-  }
-  if (index == session.index) {
-    return proto::Refusal{proto::Status::taken, "this node has the id " +
-                                                    to_string(sessions_.node_id(session)) +
-                                                    " already; choose a free one"};
-  }
-  const bool awaited = sessions_.find(index) == nullptr &&
-                       sessions_.indices().used(index.value()) &&
-                       sessions_.returns_expected_for(now) > milliseconds{0};
-  const NodeId node = make_id(hub_of(sessions_.node_id(session)), index);
-  IndexPool& indices = sessions_.indices();
-  if (awaited || !indices.take_free(index.value(), now))
-    return proto::Refusal{proto::Status::taken, why_taken(node, now)};
-  if (!keep || !indices.unkept()) return std::nullopt;
-  const std::string failure = keep();
-  if (failure.empty()) return std::nullopt;
-  indices.let_go(index.value());
-  return proto::Refusal{proto::Status::limit,
-                        "the hub cannot keep that a node has the id " + to_string(node) +
-                            ", and would give it to another one after a restart: " + failure +
-                            "; mend that and try again"};
-}
-
 std::optional<proto::Refusal> Membership::renumber(Session& session, NodeIndex index,
                                                    milliseconds now, Effects& effects,
                                                    const KeepNow& keep) {
-  if (auto failure = take_for(session, index, now, keep)) return failure;
+  if (auto refusal = sessions_.take_index(session, index, now, keep)) return refusal;
   const NodeIndex former = session.index;
   sessions_.renumber(session, index, now);
   if (keeping_due(now)) effects.emplace_back(StateDue{});
@@ -223,19 +198,34 @@ std::optional<proto::Refusal> Membership::renumber(Session& session, NodeIndex i
   return std::nullopt;
 }
 
-std::string Membership::why_taken(NodeId node, milliseconds now) const {
-  const std::string id = to_string(node);
-  if (const Session* holder = sessions_.find(node_index_of(node))) {
-    const std::string held = holder->name.empty() ? "" : " '" + holder->name.str() + "'";
-    return "the id " + id + " is that of another node" + held + "; choose a free one";
+bool Membership::let_go(const Sessions::Presented& presented, milliseconds now, Effects& effects) {
+  const Sessions::Claim claim = sessions_.claim(presented);
+  if (!claim.token && claim.session == nullptr) return false;
+  if (claim.token) sessions_.spend_token(*claim.token);
+  if (claim.session != nullptr) {
+    sessions_.spend_token(*claim.session);
+    if (claim.session->connected)
+      effects.emplace_back(
+          CloseDue{claim.session->place, GoodbyeCode::replaced,
+                   "another connection has shown the token at another hub of the network, and is "
+                   "this node now; do not come back by yourself"});
+    end(*claim.session, now, effects);
   }
-  if (const milliseconds left = sessions_.returns_expected_for(now); left > milliseconds{0}) {
-    return "the hub was restarted a moment ago, and if a node had the id " + id +
-           ", its node has not come back yet; try again in " +
-           std::to_string((left.count() + 999) / 1'000) + " s";
+  // The name is wanted, and need not be that of the token: the asking hub would take it from its
+  // holder.
+  return !directory_.in_use(presented.name);
+}
+
+void Membership::lose_name(const std::string& name, NodeId holder, const std::string& sentence,
+                           milliseconds now, Effects& effects) {
+  if (const auto index = directory_.find(name)) {
+    take_name(*sessions_.find(*index), "", now, effects);
+    effects.emplace_back(NameLossDue{*index, name, holder, sentence});
+  } else if (const Topic* topic = services_.find(name); topic != nullptr && topic->provided()) {
+    const NodeIndex provider = topic->service->provider;
+    if (!services_.withdraw(provider, topic->service->group, now, effects))
+      effects.emplace_back(NameLossDue{provider, name, holder, sentence});
   }
-  return "the id " + id +
-         " rests, since a node had it a moment ago; choose another one, or try again in a minute";
 }
 
 void Membership::stood_still(milliseconds time, milliseconds now) {

@@ -2,7 +2,6 @@
 
 #include <chrono>
 #include <cstdint>
-#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -16,7 +15,6 @@
 #include "hub/control/state/services.hpp"
 #include "hub/control/state/session_token.hpp"
 #include "hub/control/state/sessions.hpp"
-#include "hub/network/state/name_copies.hpp"
 
 namespace gimnet::hub {
 
@@ -76,9 +74,8 @@ class Membership {
   void connection_ended(Session& session, const Ending& ending, std::chrono::milliseconds now,
                         Effects& effects);
 
-  /// Keeps durable() where it outlives the hub, at once: "", or why it could not. None: a StateDue
-  /// among the effects asks for it.
-  using KeepNow = std::function<std::string()>;
+  /// Keeps durable(). None: a StateDue among the effects asks for it.
+  using KeepNow = Sessions::KeepNow;
   /// Ends the session for good: its id and name are free, its token counts as none, also after a
   /// restart, unless the answer says why not. `sentence` tells its node who did it and what to do.
   std::string kick(Session& session, const std::string& sentence, std::chrono::milliseconds now,
@@ -118,14 +115,11 @@ class Membership {
 
   /// The network of hubs has these names from now on: nobody gets one that another hub holds.
   /// Lifetime: they outlive this.
-  void join_network(const NameCopies& names) { names_ = &names; }
+  void join_network(const NameCopies& names) { directory_.join_network(names); }
   /// A node of another hub has the better claim to a name of this hub: its node goes on without
   /// one, or its service ends. Nothing happens for a name that nobody here has.
   void lose_name(const std::string& name, NodeId holder, const std::string& sentence,
                  std::chrono::milliseconds now, Effects& effects);
-  /// Why nobody may advertise a service of that full name: a node has it as its name.
-  [[nodiscard]] std::optional<proto::Refusal> service_name_refusal(
-      std::string_view full_name) const;
 
   /// The hub stood still for so long until now, and nobody could come back or declare anything:
   /// what would have run out meanwhile has its time again. To be said before tick().
@@ -156,24 +150,8 @@ class Membership {
                                                            const Sessions::Claim& claim,
                                                            std::chrono::milliseconds now,
                                                            Effects& effects);
-  /// Why `claimant` (nullptr: somebody new) cannot have the name. Of `request` only
-  /// `former` and `had_name` are looked at.
-  [[nodiscard]] std::optional<proto::Goodbye> name_refusal(std::string_view name,
-                                                           const Session* claimant,
-                                                           const JoinRequest& request,
-                                                           std::chrono::milliseconds now) const;
-  /// The same, for what other hubs and services have.
-  [[nodiscard]] std::optional<proto::Goodbye> network_refusal(std::string_view name,
-                                                              const JoinRequest& request,
-                                                              std::chrono::milliseconds now) const;
   /// Is nobody waiting for the session's node to come back?
   [[nodiscard]] static bool ends_with_connection(const Session& session, const Ending& ending);
-  /// Takes an index for a session that there is. Errors: as of renumber().
-  [[nodiscard]] std::optional<proto::Refusal> take_for(const Session& session, NodeIndex index,
-                                                       std::chrono::milliseconds now,
-                                                       const KeepNow& keep);
-  /// Why that id cannot be given to another node.
-  [[nodiscard]] std::string why_taken(NodeId node, std::chrono::milliseconds now) const;
   /// A name's holder within its grace time makes way for `claimant`. REQUIRES: directory_.refusal()
   /// saw no reason.
   void end_absent_holder(const std::string& name, const Session* claimant,
@@ -192,9 +170,8 @@ class Membership {
 
   const Limits& limits_;
   Sessions sessions_;
-  Directory directory_;
   Services services_;
-  const NameCopies* names_ = nullptr;  ///< or none: a hub that has had no link yet
+  Directory directory_;
   DueList<Redeclaring> redeclaring_;
 };
 

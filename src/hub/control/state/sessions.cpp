@@ -11,8 +11,6 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// An id that was given back rests for as long as its node might come back and a frame for it might
-/// still wait.
 }  // namespace
 
 std::string title(NodeId node, const Session& session) {
@@ -169,6 +167,47 @@ void Sessions::stood_still(milliseconds time, milliseconds now) {
   away_declared_.put_off(time, latest);
   if (returns_until_) returns_until_ = std::min(*returns_until_ + time, latest);
   indices_.put_off_returns(time, latest);
+}
+
+std::optional<proto::Refusal> Sessions::take_index(const Session& session, NodeIndex index,
+                                                   milliseconds now, const KeepNow& keep) {
+  if (index.value() == kHubIndex || index.value() >= kEveryIndex) {
+    return proto::Refusal{proto::Status::bad_request,
+                          "a node's id ends in a number from 1 to " + std::to_string(kIndexMost)};
+  }
+  if (index == session.index) {
+    return proto::Refusal{
+        proto::Status::taken,
+        "this node has the id " + to_string(node_id(session)) + " already; choose a free one"};
+  }
+  const bool awaited = find(index) == nullptr && indices_.used(index.value()) &&
+                       returns_expected_for(now) > milliseconds{0};
+  const NodeId node = make_id(hub_, index);
+  if (awaited || !indices_.take_free(index.value(), now))
+    return proto::Refusal{proto::Status::taken, why_taken(node, now)};
+  if (!keep || !indices_.unkept()) return std::nullopt;
+  const std::string failure = keep();
+  if (failure.empty()) return std::nullopt;
+  indices_.let_go(index.value());
+  return proto::Refusal{proto::Status::limit,
+                        "the hub cannot keep that a node has the id " + to_string(node) +
+                            ", and would give it to another one after a restart: " + failure +
+                            "; mend that and try again"};
+}
+
+std::string Sessions::why_taken(NodeId node, milliseconds now) const {
+  const std::string id = to_string(node);
+  if (const Session* holder = find(node_index_of(node))) {
+    const std::string held = holder->name.empty() ? "" : " '" + holder->name.str() + "'";
+    return "the id " + id + " is that of another node" + held + "; choose a free one";
+  }
+  if (const milliseconds left = returns_expected_for(now); left > milliseconds{0}) {
+    return "the hub was restarted a moment ago, and if a node had the id " + id +
+           ", its node has not come back yet; try again in " +
+           std::to_string((left.count() + 999) / 1'000) + " s";
+  }
+  return "the id " + id +
+         " rests, since a node had it a moment ago; choose another one, or try again in a minute";
 }
 
 void Sessions::renumber(Session& session, NodeIndex index, milliseconds now) {

@@ -199,7 +199,15 @@ class Sessions {
   /// allow that now.
   [[nodiscard]] bool remember_kicked(const Session& session);
   [[nodiscard]] const std::vector<SessionToken>& kicked() const { return kicked_; }
-  /// The session goes on under another index, which indices() gave; the former one rests, and leads
+  /// Keeps where it outlives the hub, at once, which ids are used: "", or why it could not.
+  using KeepNow = std::function<std::string()>;
+  /// Takes an index for renumber(). Errors: taken (held, at rest, or perhaps that of a node that
+  /// has not come back since a restart), bad_request (no index of a node), limit (it cannot be
+  /// kept, and the hub could give the index to another node after a restart). nullopt: done.
+  [[nodiscard]] std::optional<proto::Refusal> take_index(const Session& session, NodeIndex index,
+                                                         std::chrono::milliseconds now,
+                                                         const KeepNow& keep);
+  /// The session goes on under an index that take_index() took; the former one rests, and leads
   /// here until somebody else has it.
   void renumber(Session& session, NodeIndex index, std::chrono::milliseconds now);
   /// Until when nodes that were here before a restart may still be on their way back, each under an
@@ -268,6 +276,8 @@ class Sessions {
   [[nodiscard]] Session* take_due(DueList<Absence>& away, std::chrono::milliseconds now);
   Session& put(NodeIndex index, SessionNumber number, std::optional<std::uint16_t> shard_hint,
                std::chrono::milliseconds now);
+  /// Why that id cannot be given to another node.
+  [[nodiscard]] std::string why_taken(NodeId node, std::chrono::milliseconds now) const;
   /// Is it still the absence that was noted?
   [[nodiscard]] bool still_away(const Absence& away) const;
 

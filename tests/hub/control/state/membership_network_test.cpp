@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "hub/control/state/membership.hpp"
+#include "hub/network/state/name_copies.hpp"
 
 namespace gimnet::hub {
 namespace {
@@ -23,12 +24,11 @@ class MembershipNetworkTest : public ::testing::Test {
     return joined ? joined->session : nullptr;
   }
   void put(const std::string& name, std::uint32_t node,
-           proto::route::NameState state = proto::route::NameState::held, GroupId group = {}) {
+           proto::route::NameState state = proto::route::NameState::held) {
     proto::route::NameClaim claim;
     claim.version = ++version_;
     claim.node = make_id<NodeId>(kOther.hub, node);
     claim.state = state;
-    if (group != GroupId{}) claim.service.emplace().group = group;
     (void)names_.take({kOther.hub, kOther.instance, version_ - 1, version_, 0, {{name, claim}}});
   }
   static constexpr HubRun kOther{HubId{9}, proto::HubInstance{99}};
@@ -48,14 +48,6 @@ TEST_F(MembershipNetworkTest, NobodyGetsANameThatAnotherHubHolds) {
   EXPECT_NE(refusal->sentence.find("node 9.1 of hub 9"), std::string::npos) << refusal->sentence;
   put("robot", 1, proto::route::NameState::away);
   EXPECT_FALSE(membership_.rename(*node, "robot", 1s, effects_)) << "its node is away";
-}
-
-TEST_F(MembershipNetworkTest, AnUnreachableNameIsRefusedWithTheTimeThatIsLeft) {
-  put("robot", 1);
-  (void)names_.set_reachable({}, milliseconds(0));
-  const auto refusal = membership_.rename(*join("mine"), "robot", 10s, effects_);
-  ASSERT_TRUE(refusal);
-  EXPECT_NE(refusal->sentence.find("free in 20 s"), std::string::npos) << refusal->sentence;
 }
 
 TEST_F(MembershipNetworkTest, ANodeThatComesFromAHubThatIsAwayHasItsNameAtOnce) {
@@ -124,19 +116,6 @@ TEST_F(MembershipNetworkTest, ATokenDoesNotLetGoOfTheNameOfAnother) {
     EXPECT_FALSE(membership_.directory().find("mine")) << "it has moved, whatever its name is";
   }
   EXPECT_TRUE(membership_.directory().find("robot"));
-}
-
-TEST_F(MembershipNetworkTest, NodesAndFullNamesOfServicesExcludeEachOther) {
-  put("robot/laser", 1, proto::route::NameState::held, make_id<GroupId>(kOther.hub, 1));
-  put("other/laser", 2);
-  Session* node = join("mine");
-  EXPECT_TRUE(membership_.rename(*node, "robot/laser", 1s, effects_));
-  EXPECT_TRUE(membership_.service_name_refusal("other/laser"));
-  EXPECT_FALSE(membership_.service_name_refusal("robot/laser")) << "the node's name decides";
-  join("mine/laser");
-  EXPECT_TRUE(membership_.service_name_refusal("mine/laser"));
-  ASSERT_TRUE(membership_.services().advertise(node->index, "mine/odom", {}, 1s, effects_));
-  EXPECT_TRUE(membership_.rename(*join("third"), "mine/odom", 1s, effects_));
 }
 
 TEST_F(MembershipNetworkTest, ANodeThatLosesItsNameGoesOnAndAServiceEnds) {
