@@ -109,8 +109,8 @@ Work names(std::size_t count) {
   struct Hub {
     Limits limits;
     Sessions sessions{{}, limits};
-    Services services{HubId{1}, limits};
-    Directory directory{sessions, services};
+    Topics topics{HubId{1}, limits};
+    Directory directory{sessions, topics};
   };
   auto hub = std::make_shared<Hub>();
   auto all = std::make_shared<std::vector<std::string>>(colliding_names(count));
@@ -173,7 +173,8 @@ Work acks(std::size_t count) {
 Work topics(std::size_t count) {
   struct World {
     Limits limits;
-    Services services{HubId{7}, limits};
+    Topics topics{HubId{7}, limits};
+    Services services{topics, limits};
     Effects effects;
   };
   constexpr std::size_t kPerNode = 100;

@@ -47,7 +47,7 @@ void Checks::before_it_leaves(ShardIndex shard, const hub::ShardCommand& command
 }
 
 std::string Checks::stale() const {
-  for (const auto& [group, topic] : conductor_->membership().services().groups()) {
+  for (const auto& [group, topic] : conductor_->membership().topics().groups()) {
     const hub::GroupMembers* members = subject_.groups.find(group.value());
     std::size_t count = 0;
     for (std::size_t i = 0; members != nullptr && i < members->by_shard.size(); ++i) {

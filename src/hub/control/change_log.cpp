@@ -60,7 +60,7 @@ void log_change(const NodeNoted& noted, const Membership& membership, HubId hub)
 void log_change(const ServiceNoted& noted, const Membership& membership, HubId hub) {
   if (!log_enabled(LogLevel::debug)) return;
   const Topic* topic =
-      noted.kind == ChangeKind::withdrawn ? nullptr : membership.services().find_group(noted.group);
+      noted.kind == ChangeKind::withdrawn ? nullptr : membership.topics().find_group(noted.group);
   const std::string name = topic != nullptr ? std::string{topic->full_name} : noted.full_name;
   say(happening(noted.kind), "service " + to_string(make_id(hub, noted.group)) + " '" + name + "'",
       ", of " + node_text(hub, noted.provider, {}));

@@ -117,7 +117,7 @@ void Conductor::attach(Stranger& stranger, const proto::Hello& hello,
   command.known_taken = hello.resume_taken;
   command.peer_resume_bytes = hello.resume_buffer_bytes;
   command.peer_frame_bytes = hello.frame_length_max;
-  const auto seen = std::exchange(session.change_seen, membership_.services().changes());
+  const auto seen = std::exchange(session.change_seen, membership_.topics().changes());
   runner_.tellings().add_moved(session, seen, command.told);
   // Before the command, which lets WELCOME out: who has seen that can be reached. The id is
   // nobody's before.

@@ -83,7 +83,7 @@ void EffectRunner::run(const ServiceChanged& effect) {
 
 void EffectRunner::run(const PaceDue& effect) {
   const Session* session = find(effect.subscriber);
-  const Topic* topic = parts_.membership.services().find_group(effect.group);
+  const Topic* topic = parts_.membership.topics().find_group(effect.group);
   if (session != nullptr && topic != nullptr) tellings_.begin_pace(*topic, *session, false);
 }
 
@@ -102,7 +102,7 @@ void EffectRunner::run(const RetainedDropped& effect) {
 }
 
 void EffectRunner::run(const SubscribersChanged& effect) {
-  const Topic* topic = parts_.membership.services().find(effect.full_name);
+  const Topic* topic = parts_.membership.topics().find(effect.full_name);
   if (topic == nullptr || !topic->provided()) return;
   const Session* session = find(topic->service->provider);
   if (session == nullptr) return;

@@ -141,7 +141,7 @@ std::vector<Sending> GroupLinks::take_sendings() {
 
 void GroupLinks::note_away(GroupId group) {
   if (hub_of(group) == parts_.facts.id) return put_links(group);
-  const Topic* topic = parts_.membership.services().find_group(group);
+  const Topic* topic = parts_.membership.topics().find_group(group);
   trees_.want(group, topic != nullptr ? std::optional{wish_of(*topic)} : std::nullopt);
   publish_away(group);
 }
@@ -157,7 +157,7 @@ void GroupLinks::publish_away(GroupId group) {
 std::optional<TablePublisher::AwayGroup> GroupLinks::away_group(GroupId group) const {
   // Links may want groups of hubs that nobody knows: no table is made for them.
   const Neighbour* parent = find(trees_.parent(group));
-  if (parent == nullptr && parts_.membership.services().find_group(group) == nullptr)
+  if (parent == nullptr && parts_.membership.topics().find_group(group) == nullptr)
     return std::nullopt;
   TablePublisher::AwayGroup away;
   const NameCopies* names = parts_.names.copies();
@@ -191,7 +191,7 @@ void GroupLinks::set_keeper(GroupId group, const std::optional<TablePublisher::A
 GroupLinks::Stream GroupLinks::stream_of(GroupId group) const {
   using proto::ns::Delivery;
   if (hub_of(group) == parts_.facts.id) {
-    const Topic* topic = parts_.membership.services().find_group(group);
+    const Topic* topic = parts_.membership.topics().find_group(group);
     if (topic == nullptr) return {};
     const ServiceTerms& terms = topic->service->terms;
     return {terms.retain, terms.delivery == Delivery::sync ? terms.window : 0};
@@ -236,8 +236,8 @@ void GroupLinks::put_links(GroupId group) {
   }
   change.carry_out();
   if (own)
-    parts_.membership.services().set_links(group_index_of(group),
-                                           static_cast<std::uint32_t>(members.size()), effects_);
+    parts_.membership.topics().set_links(group_index_of(group),
+                                         static_cast<std::uint32_t>(members.size()), effects_);
   if (members.empty()) members_.erase(group);
 }
 

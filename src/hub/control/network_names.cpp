@@ -25,7 +25,7 @@ void NetworkNames::begin() {
                                         milliseconds{parts_.limits.grace_ms},
                                         parts_.limits.names_bytes});
   for (const auto& [index, session] : parts_.membership.sessions().all()) put(session);
-  for (const auto& [group, topic] : parts_.membership.services().groups()) put(*topic);
+  for (const auto& [group, topic] : parts_.membership.topics().groups()) put(*topic);
   parts_.membership.join_network(exchange_->copies());
   parts_.watches.join_network(exchange_->copies());
 }
@@ -72,7 +72,7 @@ void NetworkNames::note(const ServiceNoted& noted) {
   if (noted.kind == ChangeKind::withdrawn) {
     exchange_->remove_own(noted.full_name);
     withdrawn_.push_back(noted.full_name);
-  } else if (const Topic* topic = parts_.membership.services().find_group(noted.group)) {
+  } else if (const Topic* topic = parts_.membership.topics().find_group(noted.group)) {
     put(*topic);
   }
 }
@@ -106,7 +106,7 @@ void NetworkNames::settle(milliseconds now, Effects& effects) {
   for (const KnownName& winner : exchange_->take_lost()) let_go(winner, now, effects);
   for (const std::string& name : std::exchange(withdrawn_, {})) {
     if (const auto away = away_service(name))
-      parts_.membership.services().note_moved(name, away, now, effects);
+      parts_.membership.topics().note_moved(name, away, now, effects);
   }
   for (const NameChange& change : exchange_->take_changes()) {
     const bool service =
@@ -117,18 +117,18 @@ void NetworkNames::settle(milliseconds now, Effects& effects) {
   if (std::exchange(dropped_copies_, exchange_->copies().dropped_copies()) !=
       exchange_->copies().dropped_copies()) {
     std::vector<std::string> all;
-    for (const auto& [name, topic] : parts_.membership.services().by_name()) {
+    for (const auto& [name, topic] : parts_.membership.topics().by_name()) {
       if (!topic.provided()) all.push_back(name);
     }
     for (const std::string& name : all)
-      parts_.membership.services().note_moved(name, away_service(name), now, effects);
+      parts_.membership.topics().note_moved(name, away_service(name), now, effects);
     parts_.watches.begin_again();
   }
 }
 
 /// Links may want the group, whether nodes here do or not.
 void NetworkNames::note_service(const NameChange& change, milliseconds now, Effects& effects) {
-  parts_.membership.services().note_moved(change.name, away_service(change.name), now, effects);
+  parts_.membership.topics().note_moved(change.name, away_service(change.name), now, effects);
   for (const auto* claim : {&change.before, &change.after}) {
     if (*claim && (*claim)->service)
       effects.emplace_back(AwayGroupChanged{(*claim)->service->group});

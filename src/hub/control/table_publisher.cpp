@@ -49,7 +49,7 @@ void TablePublisher::publish_node(NodeIndex index, const Membership& membership)
 
 void TablePublisher::publish_group(GroupIndex index, const Membership& membership) {
   const GroupId group = make_id(hub_, index);
-  const Topic* topic = membership.services().find_group(index);
+  const Topic* topic = membership.topics().find_group(index);
   if (topic == nullptr) return replace(group, nullptr);
   auto members = copy_of(group);
   const Session* provider = membership.sessions().find(topic->service->provider);
@@ -76,7 +76,7 @@ void TablePublisher::publish_away(GroupId group, const std::optional<AwayGroup>&
     return;
   }
   auto members = copy_of(group);
-  if (membership.services().find_group(group) == nullptr) {
+  if (membership.topics().find_group(group) == nullptr) {
     for (auto& list : members->by_shard) list = {};
     members->paced_by_shard.clear();
   }
@@ -89,7 +89,7 @@ void TablePublisher::publish_away(GroupId group, const std::optional<AwayGroup>&
 
 void TablePublisher::publish_members(GroupId group, std::span<const NodeIndex> subscribers,
                                      const Membership& membership) {
-  const Topic* topic = membership.services().find_group(group);
+  const Topic* topic = membership.topics().find_group(group);
   if (!is_published(group) || (topic == nullptr && hub_of(group) == hub_)) return;
   auto members = copy_of(group);
   for (const NodeIndex subscriber : subscribers) put(*members, topic, subscriber, membership);

@@ -29,7 +29,7 @@ void Tellings::work_off(std::uint64_t& most) {
       round_ = Round{next.key(), next.mapped(), {}};
       order_.pop_front();
     }
-    const Topic* topic = parts_.membership.services().find(round_->full_name);
+    const Topic* topic = parts_.membership.topics().find(round_->full_name);
     if (topic == nullptr) {
       round_.reset();
       continue;

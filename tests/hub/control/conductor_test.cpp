@@ -135,7 +135,7 @@ TEST_F(ConductorTest, RequestsOfAReplacedConnectionChangeNothing) {
   const std::size_t sent = shards.sent.size();
   send_frame(robot, proto::Kind::ns, proto::encode(ns::Subscribe{"camera/image"}, 1));
   EXPECT_EQ(shards.sent.size(), sent);
-  EXPECT_EQ(conductor.membership().services().topics(), 0u);
+  EXPECT_EQ(conductor.membership().topics().by_name().size(), 0u);
 }
 
 TEST_F(ConductorTest, EventsOfAnEarlierSessionAreIgnored) {
@@ -266,7 +266,7 @@ TEST_F(ConductorTest, ThousandsComeAndGoAndNothingStays) {
   }
   EXPECT_TRUE(conductor.membership().sessions().all().empty());
   EXPECT_EQ(conductor.membership().directory().size(), 0u);
-  EXPECT_EQ(conductor.membership().services().topics(), 0u);
+  EXPECT_EQ(conductor.membership().topics().by_name().size(), 0u);
   EXPECT_FALSE(conductor.has_garbage());
 }
 

@@ -79,10 +79,10 @@ TEST_F(GroupLinksTest, ALinkIsAMemberOfAGroupThatItJoinedOnce) {
   EXPECT_EQ(list.find(kDownPlace.slot)->generation, kDownPlace.generation);
   const Effects effects = groups().take_effects();
   ASSERT_THAT(effects, SizeIs(1)) << "its provider hears of one subscriber";
-  EXPECT_EQ(rig_.membership.services().find("robot/scan")->subscriber_count(), 1u);
+  EXPECT_EQ(rig_.membership.topics().find("robot/scan")->subscriber_count(), 1u);
   static_cast<void>(take(kDown, route::Leave{{kOwnGroup}}));
   EXPECT_EQ(members(kOwnGroup)->by_shard[0].size(), 0u);
-  EXPECT_EQ(rig_.membership.services().find("robot/scan")->subscriber_count(), 0u);
+  EXPECT_EQ(rig_.membership.topics().find("robot/scan")->subscriber_count(), 0u);
 }
 
 TEST_F(GroupLinksTest, AJoinWaitsForAGroupThatDoesNotExist) {

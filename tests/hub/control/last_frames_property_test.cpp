@@ -33,7 +33,7 @@ class World final : private ShardProxy {
     for (FakeNode* each : {&near_, &far_}) ask(*each, ns::Subscribe{.name = "robot/odom"});
     ask(robot_, advertise());
     settle();
-    const auto& groups = conductor_.membership().services().groups();
+    const auto& groups = conductor_.membership().topics().groups();
     ASSERT_EQ(groups.size(), 1u);
     group_ = groups.begin()->first.value();
   }

@@ -52,7 +52,7 @@ class Side {
   }
   void withdraw(const Session& session, const std::string& full_name) {
     Effects effects;
-    const GroupIndex group = membership.services().find(full_name)->service->group;
+    const GroupIndex group = membership.topics().find(full_name)->service->group;
     ASSERT_FALSE(membership.services().withdraw(session.index, group, now, effects));
     carry_out(effects);
   }
@@ -260,12 +260,12 @@ TEST_F(NetworkNamesTest, ASubscriberHearsOfAServiceOfAnotherHub) {
       here_.ask<ns::SubscribeAnswer>(handle_subscribe, asker, ns::Subscribe{.name = "robot/odom"});
   ASSERT_TRUE(after);
   EXPECT_EQ(after->provider, make_id(HubId{9}, robot.index));
-  const Topic* topic = here_.membership.services().find_group(after->group);
+  const Topic* topic = here_.membership.topics().find_group(after->group);
   ASSERT_NE(topic, nullptr) << "its messages cross links";
   EXPECT_EQ(topic->away->group, make_id<GroupId>(HubId{9}, 1));
   there_.withdraw(robot, "robot/odom");
   settle();
-  EXPECT_EQ(here_.membership.services().find_group(after->group), nullptr);
+  EXPECT_EQ(here_.membership.topics().find_group(after->group), nullptr);
   EXPECT_EQ(here_.moved_services.size(), 2u);
 }
 
@@ -284,14 +284,14 @@ TEST_F(NetworkNamesTest, ASubscriberOfAnotherHubsServiceIsPacedAsItsTermsSay) {
   ASSERT_TRUE(answer);
   EXPECT_EQ(answer->window, 2u);
   EXPECT_TRUE(answer->retain);
-  const Topic* topic = here_.membership.services().find("robot/scan");
+  const Topic* topic = here_.membership.topics().find("robot/scan");
   EXPECT_TRUE(topic->retains());
   EXPECT_EQ(topic->window_of(asker.index), 2u);
   terms.window = 1;
   there_.advertise(robot, "robot/scan", terms);
   settle();
   EXPECT_EQ(topic->window_of(asker.index), 1u) << "another group, with another window";
-  EXPECT_EQ(here_.membership.services().find_group(answer->group), nullptr);
+  EXPECT_EQ(here_.membership.topics().find_group(answer->group), nullptr);
 }
 
 TEST_F(NetworkNamesTest, OfTwoHoldersOneLosesItsName) {

@@ -208,7 +208,7 @@ TEST_F(TablePublisherTest, AGroupThatWasGivenBackIsNoGroup) {
   ASSERT_FALSE(membership_.services().withdraw(robot.index, GroupIndex{1}, 0ms, effects_));
   publisher_.publish_group(GroupIndex{1}, membership_);
   EXPECT_FALSE(groups_.find(1)->provided());
-  membership_.services().tick(24h, effects_);
+  membership_.topics().tick(24h, effects_);
   publisher_.publish_group(GroupIndex{1}, membership_);
   EXPECT_EQ(groups_.find(1), nullptr);
   EXPECT_EQ(publisher_.garbage(), 0u);

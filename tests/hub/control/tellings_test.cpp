@@ -80,7 +80,7 @@ TEST_F(TellingsTest, ARegisterOfManyServicesIsToldInPiecesOfTheLimit) {
   take_told();
   ASSERT_TRUE(ask<ns::RegisterNameAnswer>(robot, ns::RegisterName{"other"}));
   EXPECT_THAT(take_told(), SizeIs(10));
-  EXPECT_EQ(conductor.membership().services().provided(), 0u) << "the state changes in one step";
+  EXPECT_EQ(conductor.membership().topics().provided(), 0u) << "the state changes in one step";
   EXPECT_TRUE(conductor.tell_rest(now));
   EXPECT_THAT(take_told(), SizeIs(10));
   EXPECT_TRUE(conductor.tell_rest(now));

@@ -16,7 +16,7 @@ ctrl::HubInfoAnswer hub_info(const HandlerContext& context) {
   answer.shards = static_cast<std::uint32_t>(context.facts.shards);
   answer.uptime_ms = static_cast<std::uint64_t>((context.now - context.facts.started).count());
   answer.nodes = static_cast<std::uint32_t>(context.membership.sessions().all().size());
-  answer.services = static_cast<std::uint32_t>(context.membership.services().provided());
+  answer.services = static_cast<std::uint32_t>(context.membership.topics().provided());
   return answer;
 }
 

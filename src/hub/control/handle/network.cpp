@@ -42,7 +42,7 @@ ctrl::HubRecord record_of(const HandlerContext& context, const HubView& hub) {
   }
   if (own) {
     record.nodes = static_cast<std::uint32_t>(context.membership.sessions().all().size());
-    record.services = static_cast<std::uint32_t>(context.membership.services().provided());
+    record.services = static_cast<std::uint32_t>(context.membership.topics().provided());
   }
   for (const HubView::Edge& edge : hub.neighbours) record.edges.push_back({edge.hub, edge.cost});
   return record;

@@ -130,7 +130,7 @@ Result<ns::ServicesAnswer, proto::Refusal> services(const HandlerContext& contex
                               "bytes in which a part may be * or **"};
   }
   NetworkPage<GroupId, ns::ServiceRecord> page(context, wanted.after, wanted.records_max);
-  const Services& own = context.membership.services();
+  const Topics& own = context.membership.topics();
   const HubTitle title{context.facts.id, context.facts.name};
   page.fill(
       names_for(context, request),
@@ -189,7 +189,7 @@ proto::Payload handle_subscribe(HandlerContext& context, const Request& request)
           if (auto refusal = count_declaration(context, request.session)) return *refusal;
         }
         // A window where there was none begins new counts, under whatever number.
-        const Topic* const known = context.membership.services().find(wanted.name);
+        const Topic* const known = context.membership.topics().find(wanted.name);
         const bool counted =
             standing && known != nullptr && known->window_of(request.session.index) != 0;
         const NameCopies* names = names_for(context, request);

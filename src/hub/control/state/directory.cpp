@@ -5,7 +5,7 @@
 #include "base/check.hpp"
 #include "base/id_text.hpp"
 #include "base/log.hpp"
-#include "hub/control/state/services.hpp"
+#include "hub/control/state/topics.hpp"
 #include "hub/network/state/name_copies.hpp"
 #include "proto/control/names.hpp"
 
@@ -41,7 +41,7 @@ std::optional<NodeIndex> Directory::find(std::string_view name) const {
 }
 
 bool Directory::is_service(std::string_view name) const {
-  const Topic* topic = services_.find(name);
+  const Topic* topic = topics_.find(name);
   return topic != nullptr && topic->provided();
 }
 

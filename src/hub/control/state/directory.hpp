@@ -14,19 +14,19 @@
 namespace gimnet::hub {
 
 class NameCopies;
-class Services;
+class Topics;
 
 /// Names of nodes: each has one holder. A live holder keeps it against everybody; one within its
 /// grace time keeps it against nobody but gets it back if nobody took it. Decides whether a name is
 /// free: nodes and services of all hubs share one space of names. In the order of names, which no
 /// choice of names can make slow, and which finds at once all that begin alike. Thread safety:
-/// none. Lifetime: sessions and services outlive it. Limits: one name a session.
+/// none. Lifetime: sessions and topics outlive it. Limits: one name a session.
 class Directory {
  public:
   using Names = std::map<std::string, NodeIndex, std::less<>>;
 
-  Directory(const Sessions& sessions, const Services& services)
-      : sessions_(sessions), services_(services) {}
+  Directory(const Sessions& sessions, const Topics& topics)
+      : sessions_(sessions), topics_(topics) {}
 
   /// The network of hubs has these names from now on: nobody gets one that another hub holds.
   /// Lifetime: they outlive this.
@@ -71,7 +71,7 @@ class Directory {
                                                               std::chrono::milliseconds now) const;
 
   const Sessions& sessions_;
-  const Services& services_;
+  const Topics& topics_;
   const NameCopies* network_ = nullptr;  ///< or none: a hub that has had no link yet
   Names names_;
 };

@@ -82,9 +82,9 @@ std::optional<Listed<NodeIndex>> list_few_nodes(const Membership& membership,
   });
 }
 
-std::optional<Listed<GroupIndex>> list_few_services(const Services& services,
+std::optional<Listed<GroupIndex>> list_few_services(const Topics& topics,
                                                     const ListingRequest<GroupIndex>& request) {
-  return list_by_name(services.by_name(), request, [](const Topic& topic) {
+  return list_by_name(topics.by_name(), request, [](const Topic& topic) {
     return topic.provided() ? topic.service->group : kNoGroup;
   });
 }
@@ -99,10 +99,9 @@ Listed<NodeIndex> list_nodes(const Membership& membership,
   });
 }
 
-Listed<GroupIndex> list_services(const Services& services,
-                                 const ListingRequest<GroupIndex>& request) {
-  if (const auto few = list_few_services(services, request)) return *few;
-  return list_by_id(services.groups(), request, [&](const Topic* topic) {
+Listed<GroupIndex> list_services(const Topics& topics, const ListingRequest<GroupIndex>& request) {
+  if (const auto few = list_few_services(topics, request)) return *few;
+  return list_by_id(topics.groups(), request, [&](const Topic* topic) {
     if (!topic->provided()) return false;
     return request.pattern == nullptr || request.pattern->matches(topic->full_name);
   });

@@ -34,7 +34,7 @@ struct ListingRequest {
 
 [[nodiscard]] Listed<NodeIndex> list_nodes(const Membership& membership,
                                            const ListingRequest<NodeIndex>& request);
-[[nodiscard]] Listed<GroupIndex> list_services(const Services& services,
+[[nodiscard]] Listed<GroupIndex> list_services(const Topics& topics,
                                                const ListingRequest<GroupIndex>& request);
 
 /// The same where all whose names begin with the pattern's parts before its first `*` are few:
@@ -44,6 +44,6 @@ struct ListingRequest {
 [[nodiscard]] std::optional<Listed<NodeIndex>> list_few_nodes(
     const Membership& membership, const ListingRequest<NodeIndex>& request);
 [[nodiscard]] std::optional<Listed<GroupIndex>> list_few_services(
-    const Services& services, const ListingRequest<GroupIndex>& request);
+    const Topics& topics, const ListingRequest<GroupIndex>& request);
 
 }  // namespace gimnet::hub

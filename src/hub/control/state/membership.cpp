@@ -29,8 +29,9 @@ Places places_for(const JoinRequest& request) {
 Membership::Membership(const Sessions::Options& options, const Limits& limits)
     : limits_(limits),
       sessions_(options, limits),
-      services_(options.hub, limits, options.groups),
-      directory_(sessions_, services_) {}
+      topics_(options.hub, limits, options.groups),
+      services_(topics_, limits),
+      directory_(sessions_, topics_) {}
 
 Result<Membership::Joined, proto::Goodbye> Membership::join(const JoinRequest& request,
                                                             milliseconds now, Effects& effects) {
@@ -153,22 +154,22 @@ std::string Membership::kick(Session& session, const std::string& sentence, mill
 }
 
 bool Membership::keeping_due(milliseconds now) const {
-  return sessions_.indices().keeping_due(now) || services_.group_indices().keeping_due(now);
+  return sessions_.indices().keeping_due(now) || topics_.group_indices().keeping_due(now);
 }
 
 Durable Membership::durable(milliseconds now) const {
-  return {sessions_.indices().next_grant(now), services_.group_indices().next_grant(now),
+  return {sessions_.indices().next_grant(now), topics_.group_indices().next_grant(now),
           sessions_.kicked()};
 }
 
 void Membership::state_not_kept() {
   sessions_.indices().keeping_failed();
-  services_.group_indices().keeping_failed();
+  topics_.group_indices().keeping_failed();
 }
 
 void Membership::state_kept(const Durable& durable) {
   sessions_.indices().grant(durable.nodes);
-  services_.group_indices().grant(durable.groups);
+  topics_.group_indices().grant(durable.groups);
 }
 
 std::optional<proto::Refusal> Membership::renumber(Session& session, NodeIndex index,
@@ -221,7 +222,7 @@ void Membership::lose_name(const std::string& name, NodeId holder, const std::st
   if (const auto index = directory_.find(name)) {
     take_name(*sessions_.find(*index), "", now, effects);
     effects.emplace_back(NameLossDue{*index, name, holder, sentence});
-  } else if (const Topic* topic = services_.find(name); topic != nullptr && topic->provided()) {
+  } else if (const Topic* topic = topics_.find(name); topic != nullptr && topic->provided()) {
     const NodeIndex provider = topic->service->provider;
     if (!services_.withdraw(provider, topic->service->group, now, effects))
       effects.emplace_back(NameLossDue{provider, name, holder, sentence});
@@ -232,7 +233,7 @@ void Membership::stood_still(milliseconds time, milliseconds now) {
   const milliseconds latest = now + milliseconds{limits_.grace_ms};
   sessions_.stood_still(time, now);
   redeclaring_.put_off(time, latest);
-  services_.put_off(time, latest);
+  topics_.put_off(time, latest);
 }
 
 void Membership::tick(milliseconds now, Effects& effects) {
@@ -242,7 +243,7 @@ void Membership::tick(milliseconds now, Effects& effects) {
     redeclaring_.pop_front();
     if (still_redeclares(due)) services_.drop_undeclared(due.index, now, effects);
   }
-  services_.tick(now, effects);
+  topics_.tick(now, effects);
 }
 
 bool Membership::still_redeclares(const Redeclaring& due) const {
@@ -255,7 +256,7 @@ std::optional<milliseconds> Membership::next_deadline() const {
   std::optional<milliseconds> deadline = sessions_.next_expiry();
   const std::optional<milliseconds> redeclaring =
       redeclaring_.empty() ? std::nullopt : std::optional{redeclaring_.front().until};
-  for (const std::optional<milliseconds>& other : {redeclaring, services_.next_deadline()}) {
+  for (const std::optional<milliseconds>& other : {redeclaring, topics_.next_deadline()}) {
     if (other && (!deadline || *other < *deadline)) deadline = other;
   }
   return deadline;

@@ -15,6 +15,7 @@
 #include "hub/control/state/services.hpp"
 #include "hub/control/state/session_token.hpp"
 #include "hub/control/state/sessions.hpp"
+#include "hub/control/state/topics.hpp"
 
 namespace gimnet::hub {
 
@@ -132,6 +133,8 @@ class Membership {
   [[nodiscard]] Sessions& sessions() { return sessions_; }
   [[nodiscard]] const Sessions& sessions() const { return sessions_; }
   [[nodiscard]] const Directory& directory() const { return directory_; }
+  [[nodiscard]] Topics& topics() { return topics_; }
+  [[nodiscard]] const Topics& topics() const { return topics_; }
   [[nodiscard]] Services& services() { return services_; }
   [[nodiscard]] const Services& services() const { return services_; }
 
@@ -170,6 +173,7 @@ class Membership {
 
   const Limits& limits_;
   Sessions sessions_;
+  Topics topics_;
   Services services_;
   Directory directory_;
   DueList<Redeclaring> redeclaring_;

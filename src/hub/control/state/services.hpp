@@ -2,108 +2,31 @@
 
 #include <chrono>
 #include <cstdint>
-#include <functional>
-#include <map>
 #include <optional>
-#include <string>
 #include <string_view>
 #include <unordered_map>
-#include <unordered_set>
 #include <vector>
 
 #include "base/result.hpp"
-#include "hub/control/state/due_list.hpp"
 #include "hub/control/state/effects.hpp"
-#include "hub/control/state/index_pool.hpp"
+#include "hub/control/state/topics.hpp"
 #include "hub/limits.hpp"
 #include "proto/control/control_message.hpp"
 
 namespace gimnet::hub {
 
-/// The terms of a service, as its provider gives them.
-struct ServiceTerms {
-  std::uint32_t message_type = 0;
-  std::uint32_t instance = 0;
-  proto::ns::Direction direction = proto::ns::Direction::provides;
-  proto::ns::Delivery delivery = proto::ns::Delivery::stream;
-  std::string metadata;
-  std::uint32_t window = 0;  ///< of sync(n)
-  bool retain = false;
-  friend bool operator==(const ServiceTerms&, const ServiceTerms&) = default;
-};
-
-/// A group id stands for a full name with its terms, whoever provides it.
-struct LocalService {
-  GroupIndex group;
-  NodeIndex provider;  ///< kNobody: nobody at the moment
-  ServiceTerms terms;  ///< the latest provider's
-};
-inline constexpr NodeIndex kNobody{};
-
-/// A service of another hub that gives data, as far as its subscribers here are concerned.
-struct AwayService {
-  GroupId group;
-  NodeId provider;
-  std::uint32_t window = 0;  ///< n of sync(n); 0: another delivery
-  bool retain = false;
-  friend bool operator==(const AwayService&, const AwayService&) = default;
-};
-
-/// A full name that somebody provides, or waits for, or that still has a group id.
-struct Topic {
-  std::string_view full_name;
-  std::optional<LocalService> service;                   ///< nothing: no group id here
-  std::optional<AwayService> away;                       ///< only without `service`
-  std::vector<NodeIndex> subscribers;                    ///< ascending
-  std::unordered_map<NodeIndex, SubscriberTerms> terms;  ///< of those that asked for something
-  /// Subscribers that changed their terms in this group: that got everything and are paced now; and
-  /// that asked for a pace and do not any more. Those stay paced, without bounds: what is held for
-  /// them goes before what comes.
-  std::unordered_set<NodeIndex> once_plain;
-  std::unordered_set<NodeIndex> once_paced;
-  std::uint64_t change = 0;  ///< number of the last one that subscribers were told; 0: none
-  std::uint64_t orphan = 0;  ///< since when, in order, nobody provides the group; 0: somebody does
-  std::uint64_t unused = 0;  ///< since when nobody has subscribed either; 0: it is used
-  std::uint32_t links = 0;   ///< that lead to subscribers at other hubs
-
-  [[nodiscard]] bool provided() const { return service && service->provider != kNobody; }
-  /// Whose messages subscribers get, from this hub or another one; nothing: no group.
-  [[nodiscard]] std::optional<GroupId> group(HubId own) const;
-  [[nodiscard]] bool retains() const {
-    return service ? service->terms.retain : away && away->retain;
-  }
-  /// As the provider counts them: a link is one.
-  [[nodiscard]] std::uint32_t subscriber_count() const {
-    return static_cast<std::uint32_t>(subscribers.size()) + links;
-  }
-  /// The pace that the shards keep for that subscriber; nothing if it gets everything.
-  [[nodiscard]] std::optional<SubscriberTerms> pace_of(NodeIndex subscriber) const;
-  /// In force; 0: the subscriber's messages are not counted.
-  [[nodiscard]] std::uint32_t window_of(NodeIndex subscriber) const {
-    const std::optional<SubscriberTerms> pace = pace_of(subscriber);
-    return pace ? pace->window : 0;
-  }
-};
-
-/// Services and subscriptions by full name. A group id stands for a name with its terms, and goes
-/// from one provider to the next. Nodes are named by index, and what a node declared stays while
-/// its session lives, its grace time included. Thread safety: none. Limits: services_per_node,
-/// subscriptions_per_node; group ids, of which those go first that nobody provides.
+/// The services and subscriptions that each node declared. They stay while its session lives, its
+/// grace time included; a node that came back declares them again, or loses them. Thread safety:
+/// none. Lifetime: the topics outlive it. Limits: services_per_node, subscriptions_per_node.
 class Services {
  public:
-  /// In the order of names, which no choice of names can make slow, and which finds at once all
-  /// that begin alike.
-  using Topics = std::map<std::string, Topic, std::less<>>;
-
-  Services(HubId hub, const Limits& limits, const IndexRange& groups = {});
+  Services(Topics& topics, const Limits& limits) : topics_(topics), limits_(limits) {}
 
   struct Advertised {
     GroupIndex group;
     std::uint32_t subscribers = 0;
   };
-  /// The name keeps its group, whoever advertises it, if no more than the metadata differs from
-  /// what the group stands for. Else it gets a new one, which its subscribers are told before it is
-  /// published. Errors: bad_request, taken, limit.
+  /// As Topics::provide(). Errors: bad_request, taken, limit.
   [[nodiscard]] Result<Advertised, proto::Refusal> advertise(NodeIndex provider,
                                                              std::string_view full_name,
                                                              const ServiceTerms& terms,
@@ -135,38 +58,10 @@ class Services {
   /// The node's session is over.
   void node_left(NodeIndex node_index, std::chrono::milliseconds now, Effects& effects);
 
-  /// Gives back the groups that nobody used for a grace time.
-  void tick(std::chrono::milliseconds now, Effects& effects);
-  /// When tick() has something to do; nothing while nothing runs out.
-  [[nodiscard]] std::optional<std::chrono::milliseconds> next_deadline() const;
-  void put_off(std::chrono::milliseconds time, std::chrono::milliseconds latest) {
-    unused_.put_off(time, latest);
-  }
-
-  /// Another hub has a service of that name, another one than before, or none any more: those here
-  /// that subscribed to it are told, and get its messages. `away`: if it gives data.
-  void note_moved(std::string_view full_name, const std::optional<AwayService>& away,
-                  std::chrono::milliseconds now, Effects& effects);
-  /// So many links lead to subscribers of that group of this hub.
-  void set_links(GroupIndex group, std::uint32_t links, Effects& effects);
-
-  /// Grows with each ServiceChanged.
-  [[nodiscard]] std::uint64_t changes() const { return changes_; }
   /// The node's subscriptions that had news for subscribers since that change, the latest last.
   [[nodiscard]] std::vector<const Topic*> moved_since(NodeIndex node, std::uint64_t change) const;
   [[nodiscard]] std::vector<const Topic*> provided_by(NodeIndex node) const;
 
-  /// nullptr: nobody provides it, nor waits for it.
-  [[nodiscard]] const Topic* find(std::string_view full_name) const;
-  /// nullptr: no such group.
-  [[nodiscard]] const Topic* find_group(GroupIndex group) const;
-  /// The same of this hub or another one, which somebody here has subscribed to.
-  [[nodiscard]] const Topic* find_group(GroupId group) const;
-  /// Topics with a group, by ascending group index; some are provided by nobody.
-  [[nodiscard]] const std::map<GroupIndex, Topic*>& groups() const { return groups_; }
-  /// Services that somebody provides.
-  [[nodiscard]] std::size_t provided() const { return groups_.size() - orphans_.size(); }
-  [[nodiscard]] const Topics& by_name() const { return topics_; }
   /// The terms that the node declared of that service; nullptr: it has not. Valid until: something
   /// changes here.
   [[nodiscard]] const ServiceTerms* provided(NodeIndex node, std::string_view full_name) const;
@@ -175,9 +70,6 @@ class Services {
   [[nodiscard]] std::size_t services_of(NodeIndex node) const;
   /// Has the node a service or a subscription?
   [[nodiscard]] bool declares(NodeIndex node) const { return nodes_.contains(node); }
-  [[nodiscard]] std::size_t topics() const { return topics_.size(); }
-  [[nodiscard]] IndexPool& group_indices() { return group_indices_; }
-  [[nodiscard]] const IndexPool& group_indices() const { return group_indices_; }
 
  private:
   struct Declared {
@@ -190,53 +82,14 @@ class Services {
     std::vector<Declared> provides;
     std::vector<Declared> subscribes;
   };
-  /// A group that nobody uses. Void once it is used or gone.
-  struct Unused {
-    std::chrono::milliseconds until;
-    GroupIndex group;
-    std::uint64_t since = 0;  ///< Topic::unused
-  };
-
   /// Takes out of `list` what was not declared in that life.
   [[nodiscard]] static std::vector<Declared> take_undeclared(std::vector<Declared>& list,
                                                              std::uint32_t life);
-  Topic& topic(std::string_view full_name);
-  void forget_if_unused(Topic& topic);
   void forget_if_idle(NodeIndex node);
-  /// A group that no other name has; the oldest ones that nobody provides make room.
-  [[nodiscard]] std::optional<GroupIndex> take_group(std::chrono::milliseconds now,
-                                                     Effects& effects);
-  void enter_group(Topic& topic, const LocalService& service, std::chrono::milliseconds now,
-                   Effects& effects);
-  void begin_away(Topic& topic, const AwayService& away, Effects& effects);
-  void end_away(Topic& topic, Effects& effects);
-  void take_over(Topic& topic, NodeIndex provider, const ServiceTerms& terms, Effects& effects);
-  void end_provision(Topic& topic, std::chrono::milliseconds now, Effects& effects);
-  void leave_group(Topic& topic, std::chrono::milliseconds now, Effects& effects);
-  void give_back(Topic& topic, std::chrono::milliseconds now, Effects& effects);
-  void note_use(Topic& topic);
-  void note_if_unused(Topic& topic, std::chrono::milliseconds now);
-  [[nodiscard]] bool is_void(const Unused& note) const;
-  void begin_pace(const Topic& topic, NodeIndex subscriber, Effects& effects) const;
-  static void forget_subscriber(Topic& topic, NodeIndex subscriber);
-  void change_terms(Topic& topic, NodeIndex subscriber, const SubscriberTerms& terms,
-                    Effects& effects);
-  [[nodiscard]] static ServiceNoted service_noted(proto::ns::ChangeKind kind, const Topic& topic);
-  void tell_subscribers(Topic& topic, Effects& effects, bool joins = false);
-  void remove_subscriber(Topic& topic, NodeIndex node, std::chrono::milliseconds now,
-                         Effects& effects);
 
-  const HubId hub_;
+  Topics& topics_;
   const Limits& limits_;
-  IndexPool group_indices_;
-  Topics topics_;
-  std::map<GroupIndex, Topic*> groups_;
-  std::map<GroupId, Topic*> away_;           ///< of other hubs
-  std::map<std::uint64_t, Topic*> orphans_;  ///< by Topic::orphan: the oldest first
-  DueList<Unused> unused_;
   std::unordered_map<NodeIndex, Node> nodes_;
-  std::uint64_t changes_ = 0;
-  std::uint64_t orphaned_ = 0;  ///< numbers the orphans, and the times at which groups fell unused
 };
 
 }  // namespace gimnet::hub

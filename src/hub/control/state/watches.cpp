@@ -57,7 +57,7 @@ void Watches::note(const ServiceNoted& noted, const Membership& membership, mill
   change.kind = noted.kind;
   const Topic* topic = noted.kind == ns::ChangeKind::withdrawn
                            ? nullptr
-                           : membership.services().find_group(noted.group);
+                           : membership.topics().find_group(noted.group);
   if (topic != nullptr) {
     change.service = record_of(hub_, *topic);
   } else {
@@ -257,7 +257,7 @@ void Watches::add_services(Watch& watch, Page& page, Turn& turn) const {
   if ((watch.subjects & ns::kWatchServices) == 0) return next_phase(watch);
   if (add_few(watch, page, turn)) return;
   add_by_id(
-      watch, page, turn, watch.last_group, turn.membership.services().groups(),
+      watch, page, turn, watch.last_group, turn.membership.topics().groups(),
       [this](GroupId last) { return names_->group_after(last); },
       [&](const Topic* topic) {
         if (topic->provided() && fits(watch, topic->full_name)) add_service(*topic, page);
@@ -297,12 +297,12 @@ bool Watches::add_few(Watch& watch, Page& page, Turn& turn) const {
       add_node(*turn.membership.sessions().find(index), page, turn);
     });
   }
-  const Services& services = turn.membership.services();
-  const auto listed = list_few_services(
-      services, {pattern, group_index_of(watch.last_group), false, records, work});
+  const Topics& topics = turn.membership.topics();
+  const auto listed =
+      list_few_services(topics, {pattern, group_index_of(watch.last_group), false, records, work});
   return add_listed(watch, page, turn, listed, [&](GroupIndex index) {
     watch.last_group = make_id(hub_.id, index);
-    add_service(*services.find_group(index), page);
+    add_service(*topics.find_group(index), page);
   });
 }
 

@@ -248,7 +248,7 @@ TEST_F(NamesTest, ChangingTheNameForEverKeepsNothing) {
     shards.sent.clear();
   }
   EXPECT_EQ(conductor.membership().directory().size(), 0u);
-  EXPECT_EQ(conductor.membership().services().topics(), 0u);
+  EXPECT_EQ(conductor.membership().topics().by_name().size(), 0u);
 }
 
 TEST_F(NamesTest, ListsConnectedNodesOnlyIfTold) {

@@ -371,7 +371,7 @@ TEST_F(ServiceRequestsTest, AStormOfSubscriptionsEndsAtTheQuotaAndThenAtTheRate)
   EXPECT_EQ(said[Status::done], 1'024);
   EXPECT_EQ(said[Status::limit], 1'024);
   EXPECT_EQ(said[Status::rate], 100'000 - 2'048);
-  EXPECT_EQ(conductor.membership().services().topics(), 1'024u + 1);
+  EXPECT_EQ(conductor.membership().topics().by_name().size(), 1'024u + 1);
   // A provider is told of no more comings and goings than the rate allows.
   const Node other = join("other");
   for (int i = 0; i < 100'000; ++i) {

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "hub/control/state/services.hpp"
+#include "hub/control/state/topics.hpp"
 #include "hub/network/state/name_copies.hpp"
 
 namespace gimnet::hub {
@@ -28,8 +28,8 @@ class DirectoryTest : public ::testing::Test {
 
   Limits limits_;
   Sessions sessions_{Sessions::Options{HubId{7}, 1, Placement::spread}, limits_};
-  Services services_{HubId{7}, limits_};
-  Directory directory_{sessions_, services_};
+  Topics topics_{HubId{7}, limits_};
+  Directory directory_{sessions_, topics_};
 };
 
 TEST_F(DirectoryTest, FindsWhoHoldsAName) {
@@ -131,7 +131,7 @@ TEST_F(DirectoryNetworkTest, NodesAndFullNamesOfServicesExcludeEachOther) {
   const Session& node = hold("mine/laser");
   EXPECT_TRUE(directory_.service_refusal("mine/laser"));
   Effects effects;
-  ASSERT_TRUE(services_.advertise(node.index, "mine/odom", {}, 1s, effects));
+  ASSERT_TRUE(topics_.provide("mine/odom", node.index, {}, 1s, effects));
   EXPECT_TRUE(directory_.refusal("mine/odom", {}, 1s));
   EXPECT_TRUE(directory_.in_use("mine/odom"));
 }

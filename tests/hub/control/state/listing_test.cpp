@@ -158,16 +158,15 @@ TEST_F(ListingTest, FindsServicesByTheirFullNames) {
   const auto robot = proto::Pattern::parse("robot/*");
   const auto any = proto::Pattern::parse("**/pose");
   EXPECT_EQ(
-      list_services(membership_.services(), {.pattern = &*robot, .most = 10, .work = 64}).indices,
+      list_services(membership_.topics(), {.pattern = &*robot, .most = 10, .work = 64}).indices,
       (std::vector{odom, pose}));
-  EXPECT_EQ(
-      list_services(membership_.services(), {.pattern = &*any, .most = 10, .work = 64}).indices,
-      std::vector{pose});
-  const Listed<GroupIndex> first = list_services(membership_.services(), {.most = 1, .work = 64});
+  EXPECT_EQ(list_services(membership_.topics(), {.pattern = &*any, .most = 10, .work = 64}).indices,
+            std::vector{pose});
+  const Listed<GroupIndex> first = list_services(membership_.topics(), {.most = 1, .work = 64});
   EXPECT_EQ(first.indices, std::vector{odom});
   EXPECT_TRUE(first.more);
   EXPECT_EQ(
-      list_services(membership_.services(), {.after = first.next, .most = 1, .work = 64}).indices,
+      list_services(membership_.topics(), {.after = first.next, .most = 1, .work = 64}).indices,
       std::vector{pose});
 }
 

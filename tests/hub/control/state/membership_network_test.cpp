@@ -123,7 +123,7 @@ TEST_F(MembershipNetworkTest, ANodeThatLosesItsNameGoesOnAndAServiceEnds) {
   ASSERT_TRUE(membership_.services().advertise(node->index, "robot/laser", {}, 1s, effects_));
   effects_.clear();
   membership_.lose_name("robot/laser", NodeId{9}, "it was first", 1s, effects_);
-  EXPECT_EQ(membership_.services().provided(), 0u);
+  EXPECT_EQ(membership_.topics().provided(), 0u);
   EXPECT_EQ(std::get<NameLossDue>(effects_.back()).name, "robot/laser");
   membership_.lose_name("robot", NodeId{9}, "it was first", 1s, effects_);
   EXPECT_EQ(node->name, "") << "it goes on, by its id";

@@ -187,10 +187,10 @@ TEST_F(MembershipTest, ServicesStayThroughTheGraceTimeAndGoWithIt) {
   ASSERT_TRUE(membership_.services().subscribe(viewer->index, "robot/odom", {}, effects_));
   lose(*robot, 1s);
   membership_.tick(1s + kGrace - 1ms, effects_);
-  EXPECT_NE(membership_.services().find_group(GroupIndex{1}), nullptr);
+  EXPECT_NE(membership_.topics().find_group(GroupIndex{1}), nullptr);
   effects_.clear();
   membership_.tick(1s + kGrace, effects_);
-  EXPECT_FALSE(membership_.services().find_group(GroupIndex{1})->provided());
+  EXPECT_FALSE(membership_.topics().find_group(GroupIndex{1})->provided());
   EXPECT_EQ(count<ServiceChanged>(), 1u);
 }
 
@@ -207,8 +207,8 @@ TEST_F(MembershipTest, WhatAReturnedNodeDoesNotDeclareAgainIsDropped) {
   ASSERT_TRUE(odom);
   EXPECT_EQ(odom->group, GroupIndex{1});
   membership_.tick(2s + kGrace, effects_);
-  EXPECT_TRUE(membership_.services().find_group(GroupIndex{1})->provided());
-  EXPECT_FALSE(membership_.services().find_group(GroupIndex{2})->provided());
+  EXPECT_TRUE(membership_.topics().find_group(GroupIndex{1})->provided());
+  EXPECT_FALSE(membership_.topics().find_group(GroupIndex{2})->provided());
 }
 
 TEST_F(MembershipTest, RolesAreAdmittedByWhoTheyAre) {
@@ -371,8 +371,8 @@ TEST_F(MembershipTest, ANewNameWithdrawsWhatTheNodeProvides) {
   ASSERT_FALSE(membership_.rename(*robot, "forklift", 1s, effects_));
   ASSERT_EQ(count<ServiceChanged>(), 1u);
   EXPECT_EQ(membership_.services().services_of(robot->index), 0u);
-  EXPECT_EQ(membership_.services().provided(), 0u);
-  EXPECT_EQ(membership_.services().topics(), 2u) << "both subscriptions wait on";
+  EXPECT_EQ(membership_.topics().provided(), 0u);
+  EXPECT_EQ(membership_.topics().by_name().size(), 2u) << "both subscriptions wait on";
 }
 
 }  // namespace

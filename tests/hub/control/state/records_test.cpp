@@ -41,7 +41,7 @@ TEST(Records, TellAllThatIsKnown) {
   EXPECT_EQ(record_of(title, session, membership.services(), 3s), node);
 
   const ns::ServiceRecord record =
-      record_of(title, *membership.services().find_group(service->group));
+      record_of(title, *membership.topics().find_group(service->group));
   EXPECT_EQ(record.group, make_id(HubId{7}, service->group));
   EXPECT_EQ(record.name, "robot/odom");
   EXPECT_EQ(record.node, node.node);

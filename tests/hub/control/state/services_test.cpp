@@ -22,7 +22,7 @@ using ::testing::IsEmpty;
 TEST_F(ServicesTest, AdvertisingOpensAGroup) {
   EXPECT_EQ(advertise(kRobot, "robot/odom"), GroupIndex{1});
   EXPECT_THAT(take_words(), ElementsAre("group 1"));
-  const Topic* topic = services_.find_group(GroupIndex{1});
+  const Topic* topic = topics_.find_group(GroupIndex{1});
   ASSERT_NE(topic, nullptr);
   EXPECT_EQ(topic->full_name, "robot/odom");
   EXPECT_EQ(topic->service->provider, kRobot);
@@ -36,7 +36,7 @@ TEST_F(ServicesTest, AdvertisingAgainKeepsTheGroup) {
   terms.metadata = "wheel encoders";
   EXPECT_EQ(advertise(kRobot, "robot/odom", terms), GroupIndex{1});
   EXPECT_THAT(take_words(), IsEmpty());
-  EXPECT_EQ(services_.find_group(GroupIndex{1})->service->terms.metadata, "wheel encoders");
+  EXPECT_EQ(topics_.find_group(GroupIndex{1})->service->terms.metadata, "wheel encoders");
 }
 
 TEST_F(ServicesTest, AnotherNodeCannotTakeAService) {
@@ -49,7 +49,7 @@ TEST_F(ServicesTest, SubscribingToAServicePublishesItsGroupBeforeItsProviderIsTo
   take_words();
   EXPECT_EQ(subscribe(kViewer, "robot/odom"), Status::done);
   EXPECT_THAT(take_words(), ElementsAre("member 2 of 1", "subscribers robot/odom"));
-  EXPECT_THAT(services_.find_group(GroupIndex{1})->subscribers, ElementsAre(kViewer));
+  EXPECT_THAT(topics_.find_group(GroupIndex{1})->subscribers, ElementsAre(kViewer));
 }
 
 TEST_F(ServicesTest, SubscribingTwiceIsOnce) {
@@ -58,7 +58,7 @@ TEST_F(ServicesTest, SubscribingTwiceIsOnce) {
   take_words();
   EXPECT_EQ(subscribe(kViewer, "robot/odom"), Status::done);
   EXPECT_THAT(take_words(), IsEmpty());
-  EXPECT_THAT(services_.find_group(GroupIndex{1})->subscribers, ElementsAre(kViewer));
+  EXPECT_THAT(topics_.find_group(GroupIndex{1})->subscribers, ElementsAre(kViewer));
 }
 
 TEST_F(ServicesTest, ANameWithoutAServiceIsWaitedFor) {
@@ -86,16 +86,16 @@ TEST_F(ServicesTest, UnsubscribingTellsTheProvider) {
 
 TEST_F(ServicesTest, AForgottenNameLeavesNothingBehind) {
   subscribe(kViewer, "robot/odom");
-  EXPECT_EQ(services_.topics(), 1u);
+  EXPECT_EQ(topics_.by_name().size(), 1u);
   EXPECT_FALSE(services_.unsubscribe(kViewer, "robot/odom", now_, effects_));
-  EXPECT_EQ(services_.topics(), 0u);
+  EXPECT_EQ(topics_.by_name().size(), 0u);
 }
 
 TEST_F(ServicesTest, OnlyTheProviderWithdraws) {
   advertise(kRobot, "robot/odom");
   EXPECT_EQ(services_.withdraw(kViewer, GroupIndex{1}, now_, effects_)->status, Status::denied);
   EXPECT_EQ(services_.withdraw(kRobot, GroupIndex{2}, now_, effects_)->status, Status::not_found);
-  EXPECT_NE(services_.find_group(GroupIndex{1}), nullptr);
+  EXPECT_NE(topics_.find_group(GroupIndex{1}), nullptr);
 }
 
 TEST_F(ServicesTest, ServicesOfANodeAreLimited) {
@@ -112,7 +112,7 @@ TEST_F(ServicesTest, SubscriptionsOfANodeAreLimited) {
   EXPECT_EQ(subscribe(kViewer, "x/b"), Status::done);
   EXPECT_EQ(subscribe(kViewer, "x/c"), Status::limit);
   EXPECT_EQ(subscribe(kViewer, "x/b"), Status::done);
-  EXPECT_EQ(services_.topics(), 2u);
+  EXPECT_EQ(topics_.by_name().size(), 2u);
   EXPECT_EQ(subscribe(kLogger, "x/c"), Status::done);
 }
 
@@ -120,7 +120,7 @@ TEST_F(ServicesTest, BadFullNamesAreRefused) {
   EXPECT_EQ(subscribe(kViewer, ""), Status::bad_request);
   EXPECT_EQ(subscribe(kViewer, "a//b"), Status::bad_request);
   EXPECT_EQ(advertise_failure(kRobot, std::string(256, 'a')), Status::bad_request);
-  EXPECT_EQ(services_.topics(), 0u);
+  EXPECT_EQ(topics_.by_name().size(), 0u);
 }
 
 TEST_F(ServicesTest, WhoLeavesTakesEverythingAlong) {
@@ -133,18 +133,18 @@ TEST_F(ServicesTest, WhoLeavesTakesEverythingAlong) {
   EXPECT_THAT(take_words(), ElementsAre("member 1 of 2", "subscribers viewer/view", "group 1",
                                         "moved robot/odom"));
   services_.node_left(kViewer, now_, effects_);
-  EXPECT_EQ(services_.topics(), 2u) << "their groups are kept for a grace time";
-  services_.tick(now_ + milliseconds{limits_.grace_ms}, effects_);
-  EXPECT_EQ(services_.topics(), 0u);
-  EXPECT_TRUE(services_.groups().empty());
+  EXPECT_EQ(topics_.by_name().size(), 2u) << "their groups are kept for a grace time";
+  topics_.tick(now_ + milliseconds{limits_.grace_ms}, effects_);
+  EXPECT_EQ(topics_.by_name().size(), 0u);
+  EXPECT_TRUE(topics_.groups().empty());
 }
 
 TEST_F(ServicesTest, ANodeMaySubscribeToItselfAndLeave) {
   advertise(kRobot, "robot/odom");
   subscribe(kRobot, "robot/odom");
   services_.node_left(kRobot, now_, effects_);
-  services_.tick(now_ + milliseconds{limits_.grace_ms}, effects_);
-  EXPECT_EQ(services_.topics(), 0u);
+  topics_.tick(now_ + milliseconds{limits_.grace_ms}, effects_);
+  EXPECT_EQ(topics_.by_name().size(), 0u);
 }
 
 TEST_F(ServicesTest, AReturnedNodeKeepsWhatItDeclaresAgain) {
@@ -159,9 +159,9 @@ TEST_F(ServicesTest, AReturnedNodeKeepsWhatItDeclaresAgain) {
   EXPECT_THAT(take_words(), IsEmpty());
   services_.drop_undeclared(kRobot, now_, effects_);
   EXPECT_THAT(take_words(), ElementsAre("group 2"));
-  EXPECT_TRUE(services_.find_group(GroupIndex{1})->provided());
+  EXPECT_TRUE(topics_.find_group(GroupIndex{1})->provided());
   EXPECT_EQ(services_.services_of(kRobot), 1u);
-  EXPECT_EQ(services_.topics(), 3u);
+  EXPECT_EQ(topics_.by_name().size(), 3u);
 }
 
 TEST_F(ServicesTest, ARenamedNodeProvidesNothingUnderItsOldName) {
@@ -169,7 +169,7 @@ TEST_F(ServicesTest, ARenamedNodeProvidesNothingUnderItsOldName) {
   subscribe(kRobot, "x/a");
   services_.node_renamed(kRobot, now_, effects_);
   EXPECT_EQ(services_.services_of(kRobot), 0u);
-  EXPECT_FALSE(services_.find_group(GroupIndex{1})->provided());
+  EXPECT_FALSE(topics_.find_group(GroupIndex{1})->provided());
 }
 
 TEST_F(ServicesTest, ARenumberedNodeKeepsItsGroupsAndSubscriptions) {
@@ -179,8 +179,7 @@ TEST_F(ServicesTest, ARenumberedNodeKeepsItsGroupsAndSubscriptions) {
   take_words();
   services_.node_renumbered(kRobot, NodeIndex{40}, effects_);
   EXPECT_THAT(take_words(), ElementsAre("group 1", "moved robot/odom", "member 40 of 1"));
-  EXPECT_THAT(services_.find_group(GroupIndex{1})->subscribers,
-              ElementsAre(kViewer, NodeIndex{40}));
+  EXPECT_THAT(topics_.find_group(GroupIndex{1})->subscribers, ElementsAre(kViewer, NodeIndex{40}));
   services_.node_renumbered(kViewer, NodeIndex{41}, effects_);
   EXPECT_THAT(take_words(), ElementsAre("member 41 of 1")) << "in case its turn to join passed";
 }
@@ -190,7 +189,7 @@ TEST_F(ServicesTest, ASubscriberThatIsRenumberedKeepsItsTerms) {
   EXPECT_EQ(subscribe(kViewer, "robot/odom"), Status::done);
   EXPECT_TRUE(services_.subscribe(kViewer, "robot/odom", {.interval_us = 1000}, effects_));
   services_.node_renumbered(kViewer, NodeIndex{40}, effects_);
-  const Topic& topic = *services_.find_group(GroupIndex{1});
+  const Topic& topic = *topics_.find_group(GroupIndex{1});
   ASSERT_TRUE(topic.pace_of(NodeIndex{40}));
   EXPECT_EQ(topic.pace_of(NodeIndex{40})->interval_us, 1000u);
   EXPECT_THAT(topic.once_plain, ElementsAre(NodeIndex{40}));
@@ -212,19 +211,19 @@ TEST_F(ServicesTest, ASubscriberOfAStreamIsPacedOnlyIfItWantsAWindowOrARate) {
   EXPECT_THAT(take_words(), ElementsAre("member 2 of 1", "subscribers robot/odom"));
   EXPECT_TRUE(services_.subscribe(kViewer, "robot/odom", {.interval_us = 1000}, effects_));
   EXPECT_THAT(take_words(), ElementsAre("member 2 of 1", "pace 2 of 1: 0/1, once plain"));
-  EXPECT_THAT(services_.find_group(GroupIndex{1})->once_plain, ElementsAre(kViewer))
+  EXPECT_THAT(topics_.find_group(GroupIndex{1})->once_plain, ElementsAre(kViewer))
       << "until then it gets everything";
   // It stays paced: what is held for it goes before what comes.
   EXPECT_TRUE(services_.subscribe(kViewer, "robot/odom", {}, effects_));
   EXPECT_THAT(take_words(), ElementsAre("pace 2 of 1: 0/1, once plain"));
-  EXPECT_TRUE(services_.find_group(GroupIndex{1})->pace_of(kViewer));
+  EXPECT_TRUE(topics_.find_group(GroupIndex{1})->pace_of(kViewer));
   EXPECT_FALSE(services_.unsubscribe(kViewer, "robot/odom", now_, effects_));
   EXPECT_THAT(take_words(),
               ElementsAre("member 2 of 1", "no pace 2 of 1", "subscribers robot/odom"));
   // A subscriber that begins again begins as any other.
   EXPECT_EQ(subscribe(kViewer, "robot/odom"), Status::done);
   EXPECT_THAT(take_words(), ElementsAre("member 2 of 1", "subscribers robot/odom"));
-  EXPECT_FALSE(services_.find_group(GroupIndex{1})->pace_of(kViewer));
+  EXPECT_FALSE(topics_.find_group(GroupIndex{1})->pace_of(kViewer));
 }
 
 }  // namespace

@@ -78,9 +78,9 @@ TEST_F(StoodStill, WhoCameBackHasItsTimeToDeclare) {
   ASSERT_TRUE(membership_.join(again, 2s, effects_));
   membership_.stood_still(60s, 63s);
   membership_.tick(92s - 1ms, effects_);
-  EXPECT_TRUE(membership_.services().find_group(GroupIndex{1})->provided());
+  EXPECT_TRUE(membership_.topics().find_group(GroupIndex{1})->provided());
   membership_.tick(92s, effects_);
-  EXPECT_FALSE(membership_.services().find_group(GroupIndex{1})->provided());
+  EXPECT_FALSE(membership_.topics().find_group(GroupIndex{1})->provided());
 }
 
 TEST_F(StoodStill, AfterARestartThoseOfBeforeHaveTheirTime) {

@@ -145,7 +145,7 @@ TEST_F(WatchesTest, AreTrueThoughTheWorldChangesBetweenThePages) {
   std::set<std::string> expected;
   for (const auto& [index, session] : membership.sessions().all())
     expected.insert(session.name.str());
-  for (const auto& [group, topic] : membership.services().groups()) {
+  for (const auto& [group, topic] : membership.topics().groups()) {
     if (topic->provided()) expected.insert(std::string{topic->full_name});
   }
   EXPECT_EQ(known, expected);

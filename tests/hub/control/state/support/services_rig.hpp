@@ -29,8 +29,8 @@ inline ServiceTerms odometry() {
 }
 
 /// The terms that a paced subscriber is held to now.
-inline std::string pace_text(const Services& services, const PaceDue& due) {
-  const Topic* topic = services.find_group(due.group);
+inline std::string pace_text(const Topics& topics, const PaceDue& due) {
+  const Topic* topic = topics.find_group(due.group);
   const auto pace = topic != nullptr ? topic->pace_of(due.subscriber) : std::nullopt;
   if (!pace) return "none";
   return std::to_string(pace->window) + "/" + std::to_string(pace->depth) +
@@ -39,7 +39,7 @@ inline std::string pace_text(const Services& services, const PaceDue& due) {
 }
 
 /// Effects as short words, in order: "group 1", "moved robot/odom", "subscribers robot/odom".
-inline std::vector<std::string> words(const Effects& effects, const Services& services) {
+inline std::vector<std::string> words(const Effects& effects, const Topics& topics) {
   std::vector<std::string> result;
   for (const Effect& effect : effects) {
     if (const auto* group = std::get_if<GroupChanged>(&effect)) {
@@ -53,7 +53,7 @@ inline std::vector<std::string> words(const Effects& effects, const Services& se
       result.push_back("subscribers " + change->full_name);
     } else if (const auto* pace = std::get_if<PaceDue>(&effect)) {
       result.push_back("pace " + std::to_string(pace->subscriber.value()) + " of " +
-                       std::to_string(index_of(pace->group)) + ": " + pace_text(services, *pace));
+                       std::to_string(index_of(pace->group)) + ": " + pace_text(topics, *pace));
     } else if (const auto* ended = std::get_if<PaceEnded>(&effect)) {
       result.push_back("no pace " + std::to_string(ended->subscriber.value()) + " of " +
                        std::to_string(index_of(ended->group)));
@@ -87,13 +87,14 @@ class ServicesTest : public ::testing::Test {
     return done ? Status::done : done.error().status;
   }
   std::vector<std::string> take_words() {
-    std::vector<std::string> result = words(effects_, services_);
+    std::vector<std::string> result = words(effects_, topics_);
     effects_.clear();
     return result;
   }
 
   Limits limits_;
-  Services services_{HubId{7}, limits_};
+  Topics topics_{HubId{7}, limits_};
+  Services services_{topics_, limits_};
   Effects effects_;
   std::chrono::milliseconds now_{0};
 };

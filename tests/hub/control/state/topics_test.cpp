@@ -1,3 +1,5 @@
+#include "hub/control/state/topics.hpp"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -28,7 +30,7 @@ TEST_F(ServicesTest, OtherTermsMeanAnotherGroupThatSubscribersJoinAsTheyAreTold)
   terms.message_type = 99;
   EXPECT_EQ(advertise(kRobot, "robot/odom", terms), GroupIndex{2});
   EXPECT_THAT(take_words(), ElementsAre("group 1", "group 2", "moved robot/odom, joins"));
-  EXPECT_EQ(services_.find_group(GroupIndex{1}), nullptr);
+  EXPECT_EQ(topics_.find_group(GroupIndex{1}), nullptr);
   EXPECT_EQ(services_.services_of(kRobot), 1u);
 }
 
@@ -38,8 +40,8 @@ TEST_F(ServicesTest, WithdrawingTellsSubscribersAndKeepsThemWaiting) {
   take_words();
   EXPECT_FALSE(services_.withdraw(kRobot, GroupIndex{1}, now_, effects_));
   EXPECT_THAT(take_words(), ElementsAre("group 1", "moved robot/odom"));
-  EXPECT_FALSE(services_.find_group(GroupIndex{1})->provided());
-  EXPECT_EQ(services_.provided(), 0u);
+  EXPECT_FALSE(topics_.find_group(GroupIndex{1})->provided());
+  EXPECT_EQ(topics_.provided(), 0u);
   EXPECT_EQ(services_.withdraw(kRobot, GroupIndex{1}, now_, effects_)->status, Status::not_found);
   // The same terms by anybody: the same group.
   EXPECT_EQ(advertise(kLogger, "robot/odom"), GroupIndex{1});
@@ -56,32 +58,32 @@ TEST_F(ServicesTest, AGroupThatNobodyUsesIsGivenBackAfterAGraceTime) {
   const milliseconds grace{limits_.grace_ms};
   advertise(kRobot, "robot/odom");
   EXPECT_FALSE(services_.withdraw(kRobot, GroupIndex{1}, now_, effects_));
-  EXPECT_EQ(services_.next_deadline(), now_ + grace);
+  EXPECT_EQ(topics_.next_deadline(), now_ + grace);
   subscribe(kViewer, "robot/odom");
-  services_.tick(now_ + grace, effects_);
-  EXPECT_NE(services_.find_group(GroupIndex{1}), nullptr) << "somebody waits for it";
+  topics_.tick(now_ + grace, effects_);
+  EXPECT_NE(topics_.find_group(GroupIndex{1}), nullptr) << "somebody waits for it";
   now_ += grace;
   EXPECT_FALSE(services_.unsubscribe(kViewer, "robot/odom", now_, effects_));
-  services_.tick(now_ + grace - 1ms, effects_);
-  EXPECT_NE(services_.find_group(GroupIndex{1}), nullptr);
+  topics_.tick(now_ + grace - 1ms, effects_);
+  EXPECT_NE(topics_.find_group(GroupIndex{1}), nullptr);
   take_words();
-  services_.tick(now_ + grace, effects_);
+  topics_.tick(now_ + grace, effects_);
   EXPECT_THAT(take_words(), ElementsAre("group 1"));
-  EXPECT_EQ(services_.topics(), 0u);
-  EXPECT_EQ(services_.next_deadline(), std::nullopt);
+  EXPECT_EQ(topics_.by_name().size(), 0u);
+  EXPECT_EQ(topics_.next_deadline(), std::nullopt);
   EXPECT_EQ(advertise(kRobot, "robot/odom"), GroupIndex{2}) << "the id rests";
 }
 
 TEST_F(ServicesTest, AGroupThatNobodyUsesMakesWayForTheServiceOfAnotherHub) {
   const AwayService away{make_id<GroupId>(HubId{9}, 3), make_id<NodeId>(HubId{9}, 1)};
   advertise(kRobot, "robot/odom");
-  services_.note_moved("robot/odom", away, now_, effects_);
-  EXPECT_NE(services_.find_group(GroupIndex{1}), nullptr) << "it is provided here";
+  topics_.note_moved("robot/odom", away, now_, effects_);
+  EXPECT_NE(topics_.find_group(GroupIndex{1}), nullptr) << "it is provided here";
   EXPECT_FALSE(services_.withdraw(kRobot, GroupIndex{1}, now_, effects_));
-  services_.note_moved("robot/odom", std::nullopt, now_, effects_);
-  EXPECT_NE(services_.find_group(GroupIndex{1}), nullptr) << "it may come back";
-  services_.note_moved("robot/odom", away, now_, effects_);
-  EXPECT_EQ(services_.topics(), 0u);
+  topics_.note_moved("robot/odom", std::nullopt, now_, effects_);
+  EXPECT_NE(topics_.find_group(GroupIndex{1}), nullptr) << "it may come back";
+  topics_.note_moved("robot/odom", away, now_, effects_);
+  EXPECT_EQ(topics_.by_name().size(), 0u);
   const auto topic = services_.subscribe(kViewer, "robot/odom", {}, effects_, away);
   ASSERT_TRUE(topic);
   EXPECT_EQ((*topic)->away->group, away.group);
@@ -99,8 +101,8 @@ TEST_F(ServicesTest, TheOldestGroupsThatNobodyProvidesMakeRoomWhereFewAreLeft) {
   EXPECT_EQ(advertise(kLogger, "logger/one"), GroupIndex{kHeldMost + 1});
   EXPECT_THAT(take_words(),
               ElementsAre("group 7", "moved robot/s7", "group " + std::to_string(kHeldMost + 1)));
-  EXPECT_FALSE(services_.find("robot/s7")->service) << "its subscription stays";
-  EXPECT_NE(services_.find_group(GroupIndex{5}), nullptr);
+  EXPECT_FALSE(topics_.find("robot/s7")->service) << "its subscription stays";
+  EXPECT_NE(topics_.find_group(GroupIndex{5}), nullptr);
   // A name that makes room for itself.
   ServiceTerms terms = odometry();
   terms.instance = 99;
@@ -112,7 +114,7 @@ TEST_F(ServicesTest, WhoComesBackIsToldOfWhatChangedSince) {
   advertise(kRobot, "robot/scan");
   subscribe(kViewer, "robot/odom");
   subscribe(kViewer, "robot/scan");
-  const std::uint64_t before = services_.changes();
+  const std::uint64_t before = topics_.changes();
   EXPECT_THAT(services_.moved_since(kViewer, before), IsEmpty());
   EXPECT_FALSE(services_.withdraw(kRobot, GroupIndex{2}, now_, effects_));
   EXPECT_FALSE(services_.withdraw(kRobot, GroupIndex{1}, now_, effects_));
@@ -139,7 +141,7 @@ TEST_F(ServicesTest, AGroupIsPublishedBeforeItsMembersJoin) {
   EXPECT_THAT(take_words(), IsEmpty()) << "nobody provides it yet";
   EXPECT_EQ(advertise(kRobot, "robot/map", map_in_sync()), GroupIndex{1});
   EXPECT_THAT(take_words(), ElementsAre("group 1", "moved robot/map, joins"));
-  EXPECT_EQ(services_.find("robot/map")->pace_of(kViewer), wanted);
+  EXPECT_EQ(topics_.find("robot/map")->pace_of(kViewer), wanted);
   EXPECT_EQ(subscribe(kLogger, "robot/map"), Status::done);
   EXPECT_THAT(take_words(),
               ElementsAre("member 3 of 1", "pace 3 of 1: 4/1 retained", "subscribers robot/map"));
