@@ -52,15 +52,14 @@ def left_ms(end: float, most: int) -> int:
     return most if left * 1000 >= most else max(0, math.ceil(left * 1000))
 
 
-def in_pieces(timeout: Optional[float], call: Callable[[int], Any], ended: Callable[[], bool] = lambda: False) -> int:
-    """Calls with milliseconds until the status is not GIMI_TIMEOUT, or that is the end, or the seconds are
-    over; None: no limit."""
+def in_pieces(timeout: Optional[float], call: Callable[[int], Any]) -> int:
+    """Calls with milliseconds until the status is not GIMI_TIMEOUT, or the seconds are over; None: no limit."""
     check_time(timeout)
     status = int(call(0))
-    if status != _c.GIMI_TIMEOUT or ended():
+    if status != _c.GIMI_TIMEOUT:
         return status
     end = end_of(timeout)
-    while status == _c.GIMI_TIMEOUT and not ended():
+    while status == _c.GIMI_TIMEOUT:
         left = left_ms(end, PIECE_MS)
         if left <= 0:
             break
@@ -129,21 +128,6 @@ class Handle:
         errors.check(status)
 
 
-class Blocking(Handle):
-    """A handle with calls that wait."""
-
-    def until(self, timeout: Optional[float], call: Callable[[int], Any]) -> int:
-        """The status of the call when it is not GIMI_TIMEOUT, or the time is over."""
-        return in_pieces(timeout, call)
-
-    def wait(self, timeout: Optional[float], call: Callable[[int], Any]) -> None:
-        """Timeout names the whole time, and the library only its last piece."""
-        status = self.until(timeout, call)
-        if status == _c.GIMI_TIMEOUT:
-            raise errors.Timeout(f"nothing came within {timeout} s")
-        self.check(status)
-
-
 class Joining:
     """Held while a handle joins a set or leaves it, so that it is never seen in between."""
 
@@ -186,7 +170,7 @@ class RawSet:
         _c.lib.gimi_wait_set_wait(self.handle, _c.gimi_ready(), 1, ctypes.sizeof(_c.gimi_ready), 0, ctypes.c_size_t())
 
 
-class Waitable(Blocking):
+class Waitable(Handle):
     """A handle from which something comes: wait for it with receive(), with others in a WaitSet, or in select,
     poll and asyncio by its fileno()."""
 
@@ -245,7 +229,15 @@ class Waitable(Blocking):
         if self._set is not None:
             self._set.wake()
 
+    def wait(self, timeout: Optional[float], call: Callable[[int], Any]) -> None:
+        """Timeout names the whole time, and the library only its last piece."""
+        status = self.until(timeout, call)
+        if status == _c.GIMI_TIMEOUT:
+            raise errors.Timeout(f"nothing came within {timeout} s")
+        self.check(status)
+
     def until(self, timeout: Optional[float], call: Callable[[int], Any]) -> int:
+        """The status of the call when it is not GIMI_TIMEOUT, or the time is over."""
         check_time(timeout)
         status = int(call(0))
         if status != _c.GIMI_TIMEOUT:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any, Deque, Dict, Iterator, List, Optional, Tuple, Type, Union
 
 from . import _c, errors, messages
-from .handles import Blocking, Exit, Handle, Raw, Stream, Waitable, in_pieces, sized, to_key, to_ms, to_text
+from .handles import Exit, Handle, Raw, Stream, Waitable, in_pieces, sized, to_key, to_ms, to_text
 from .messages import Event, Message, NodeRecord, Peer, ServiceRecord
 from .requests import Answers, Pending, Reply
 
@@ -98,8 +98,9 @@ class ConnectionWatch(Stream[ConnectionEvent]):
         return ConnectionEvent(change, raw.why.decode(errors="replace"), raw.when_ns / 1e9, raw.skipped)
 
 
-class Publisher(Blocking):
-    """A service that this node provides, until close() or the end of the node."""
+class Publisher(Waitable):
+    """A service that this node provides, until close() or the end of the node. A WaitSet, or its fileno(), tells when
+    subscribers_changed(0) gives another number."""
 
     # The program can do nothing about these but go on: the hub is away, or slow.
     _AWAY = (_c.GIMI_TIMEOUT, _c.GIMI_NOT_CONNECTED, _c.GIMI_REFUSED)
@@ -132,7 +133,11 @@ class Publisher(Blocking):
 
     def wait_for_subscribers(self, count: int = 1, timeout: Optional[float] = None) -> None:
         """Timeout, Closed."""
-        self.wait(timeout, lambda ms: _c.lib.gimi_wait_for_subscribers(self._handle, count, ms))
+        # Its descriptor stays readable until subscribers_changed() took the number.
+        status = in_pieces(timeout, lambda ms: _c.lib.gimi_wait_for_subscribers(self._handle, count, ms))
+        if status == _c.GIMI_TIMEOUT:
+            raise errors.Timeout(f"there were not {count} subscribers within {timeout} s")
+        self.check(status)
 
     def subscribers_changed(self, timeout: Optional[float] = None) -> int:
         """Waits until their number is another one than this told last, and tells it; the first call does not

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import ctypes
+import math
+import time
 from typing import Any, Dict, Optional
 
 from . import _c, bitestream, errors, messages
-from .handles import Handle, Stream, Waitable, in_pieces, to_text
+from .handles import PIECE_MS, Handle, Stream, Waitable, end_of, in_pieces, to_text
 from .messages import Peer
 
 __all__ = ["Answers", "Pending", "Reply", "Request"]
 
+_ENDED = -1  # no status of the library: the request ended, since its own time was over
 _RAN = {_c.GIMI_RAN_NO: "no", _c.GIMI_RAN_MAYBE: "maybe", _c.GIMI_RAN_YES: "yes"}
 
 
@@ -52,10 +55,20 @@ class Pending(Waitable):
     def receive(self, timeout: Optional[float] = None) -> Reply:
         """Waits for the end of the request, which comes once. Timeout with `ran` "": not yet."""
         raw = _c.gimi_reply()
-        # In pieces: a descriptor for each request would cost more than the request.
-        status = in_pieces(timeout, lambda ms: _c.lib.gimi_wait_for_reply(self._handle, ms, raw), lambda: bool(raw.ended))
-        if status == _c.GIMI_TIMEOUT and not raw.ended:
+
+        def call(ms: int) -> int:
+            status = int(_c.lib.gimi_wait_for_reply(self._handle, ms, raw))
+            return _ENDED if raw.ended and status == _c.GIMI_TIMEOUT else status
+
+        end = end_of(timeout)
+        # The first piece without a descriptor, which would cost more than a short request.
+        status = in_pieces(PIECE_MS / 1e3 if timeout is None else min(timeout, PIECE_MS / 1e3), call)
+        left = end - time.monotonic()
+        if status == _c.GIMI_TIMEOUT and left > 0:
+            status = self.until(None if left == math.inf else left, call)
+        if status == _c.GIMI_TIMEOUT:
             raise errors.Timeout(f"no end of the request within {timeout} s")
+        status = _c.GIMI_TIMEOUT if status == _ENDED else status
         try:
             self.check(status)
             return Reply(raw)

@@ -14,8 +14,8 @@ _READY_MAX = 64
 
 
 class WaitSet(Handle):
-    """Subscriptions, accepted services, answering services, watches, pending requests and nodes, of which wait()
-    tells those that have something, again and again until it was taken. Each is in at most one set."""
+    """Subscriptions, accepted services, answering services, watches, pending requests, publishers and nodes, of
+    which wait() tells those that have something, again and again until it was taken. Each is in at most one set."""
 
     def __init__(self) -> None:
         raw = RawSet()

@@ -238,7 +238,7 @@ class Nodes(TwoNodes):
             (gimnet.BadArgument, "a time of inf s", lambda: self.viewer.find("robot", timeout=float("inf"))),
             (TypeError, "number of seconds", lambda: accepted.receive("1")),
             (TypeError, "number of seconds", lambda: self.viewer.find("robot", timeout=None)),
-            (TypeError, "from a Publisher", lambda: waits.add(pose)),
+            (TypeError, "from a Request", lambda: waits.add(request)),
             (gimnet.BadArgument, "32 bits", lambda: request.fail(1 << 40)),
             (TypeError, "a str is needed", lambda: request.fail(1, None)),
             (gimnet.Closed, "this Node was closed", left.state),

@@ -8,6 +8,7 @@ import signal
 import sys
 import threading
 import unittest
+import unittest.mock
 
 import gimnet
 from support.processes import Hub
@@ -52,6 +53,39 @@ class Waiting(TwoNodes):
                     waits.wait(wrong)
         with self.assertRaises(gimnet.Closed):
             waits.wait(0)
+
+    def test_a_publisher_tells_how_many_subscribers_there_are(self):
+        publisher, subscription = self.pair("pose")
+        with gimnet.WaitSet() as waits:
+            waits.add(publisher, "pose")
+            for count in (1, 0):
+                self.assertEqual(waits.wait(PATIENCE_S), ["pose"])
+                self.assertEqual(publisher.subscribers_changed(0), count)
+                with self.assertRaises(gimnet.Timeout):
+                    waits.wait(0)
+                with self.assertRaisesRegex(gimnet.Timeout, "not 2 subscribers within 0.01 s"):
+                    publisher.wait_for_subscribers(2, 0.01)
+                subscription.close()
+        self.assert_readable(publisher, False)
+        subscription = self.viewer.subscribe("robot/pose")
+        self.assert_readable(publisher, patience=PATIENCE_S)
+
+    def test_a_long_request_is_waited_for_without_asking_again_and_again(self):
+        add = self.robot.answer("add")
+        asked = unittest.mock.Mock(side_effect=gimnet._c.lib.gimi_wait_for_reply)
+        with unittest.mock.patch.object(gimnet._c.lib, "gimi_wait_for_reply", asked):
+            with self.viewer.request_later("robot/add", "1", PATIENCE_S) as pending:
+                with self.assertRaisesRegex(gimnet.Timeout, "within 0.3 s") as raised:
+                    pending.receive(0.3)
+                self.assertEqual(raised.exception.ran, "")
+                self.assertLessEqual(asked.call_count, 6)
+                add.receive(PATIENCE_S).reply("2")
+                self.assertEqual(pending.receive().text, "2")
+                with self.assertRaises(gimnet.Closed):
+                    pending.receive(1)
+            with self.assertRaisesRegex(gimnet.Timeout, "robot/add") as raised:
+                self.viewer.request("robot/add", "2", timeout=0.2)
+            self.assertIn(raised.exception.ran, ("no", "maybe"))
 
     def test_a_source_is_in_one_set(self):
         _, subscription = self.pair("pose")
