@@ -4,7 +4,6 @@
 #include <cstring>
 #include <utility>
 
-#include "base/clock.hpp"
 #include "hub/shard/flow_words.hpp"
 #include "hub/shard/repeated_receive.hpp"
 #include "proto/frame/extensions.hpp"
@@ -95,7 +94,7 @@ bool ConnectionReader::process(Connection& connection, ReceiveBuffer::Received r
   while (next != received.end) {
     const proto::RunView repeats = state_.router.append_repeats(next, received.end);
     if (repeats.frames != 0) {
-      count(connection, repeats);
+      count_accepted(state_, connection, repeats);
       next += repeats.size;
       if (next == received.end) break;
     }
@@ -115,6 +114,32 @@ bool ConnectionReader::process(Connection& connection, ReceiveBuffer::Received r
   return true;
 }
 
+bool ConnectionReader::process_link(Connection& connection, ReceiveBuffer::Received received) {
+  state_.router.set_neighbour(hub_of(connection.node));
+  const bool open = process_runs(connection, received);
+  state_.router.set_neighbour(kOwnHub);
+  return open;
+}
+
+bool ConnectionReader::process_runs(Connection& connection, ReceiveBuffer::Received received) {
+  const auto length_max = static_cast<std::uint32_t>(state_.limits.frame_bytes);
+  const std::byte* next = received.begin;
+  state_.router.begin_bytes(connection.node);
+  while (next != received.end) {
+    proto::NextRun found = proto::next_run(next, received.end, length_max);
+    if (found.found != proto::Found::run)
+      return take_begun(connection, {next, received.end}, next == received.begin, found);
+    if (state_.router.deliveries() >= deliveries_end_) {
+      keep_rest(connection, {next, received.end});
+      break;
+    }
+    if (!handle_run(connection, found)) return false;
+    next += found.run.size;
+  }
+  connection.tail_since_ms = 0;
+  return true;
+}
+
 /// Bytes behind the last whole frame.
 [[gnu::noinline]] bool ConnectionReader::take_begun(Connection& connection,
                                                     std::span<const std::byte> begun,
@@ -122,9 +147,10 @@ bool ConnectionReader::process(Connection& connection, ReceiveBuffer::Received r
                                                     const proto::NextRun& found) {
   if (found.found == proto::Found::too_long) {
     connection.ingress.error = proto::FrameError::too_long;
-    return refuse(connection, proto::DropReason::malformed, proto::GoodbyeCode::malformed,
-                  "the frame's length is over the largest frame, " +
-                      std::to_string(state_.limits.frame_bytes) + " bytes");
+    return hub_frames_.refuse(connection, proto::DropReason::malformed,
+                              proto::GoodbyeCode::malformed,
+                              "the frame's length is over the largest frame, " +
+                                  std::to_string(state_.limits.frame_bytes) + " bytes");
   }
   if (connection.tail_since_ms == 0 || !nothing_before) connection.tail_since_ms = state_.now_ms;
   if (keep(connection, begun, found.needed)) return true;
@@ -181,61 +207,15 @@ bool ConnectionReader::handle_run(Connection& connection, proto::NextRun& found)
     }
     return true;
   }
-  return handle_other(connection, view, admission);
-}
-
-bool ConnectionReader::handle_other(Connection& connection, const proto::RunView& view,
-                                    Admission admission) {
-  if (connection.is_link()) return handle_from_link(connection, view, admission);
-  switch (admission) {
-    case Admission::flow:
-      return handle_flow(connection, view);
-    case Admission::link:
-      return handle_link(connection, view);
-    case Admission::control:
-      return handle_control(connection, view);
-    case Admission::wrong_source:
-      state_.counters.wrong_source.add(1);
-      return refuse(
-          connection, proto::DropReason::wrong_source, proto::GoodbyeCode::wrong_source,
-          "a frame's source is not this connection's node id; put the id from WELCOME into src");
-    case Admission::data:
-    case Admission::malformed:
-    case Admission::hop_limit:
-    case Admission::report:
-      break;
-  }
-  return refuse(
-      connection, proto::DropReason::malformed, proto::GoodbyeCode::malformed,
-      std::string("malformed frame: ") + proto::frame_error_text(connection.ingress.error));
-}
-
-bool ConnectionReader::refuse(Connection& connection, proto::DropReason reason,
-                              proto::GoodbyeCode code, const std::string& sentence) {
-  // One frame came and ended here; what stands behind it is not looked at and so was never a frame.
-  state_.tally.accepted += 1;
-  state_.tally.drop(reason, 1);
-  closer_.close(connection, code, sentence);
-  return false;
+  if (connection.is_link()) return link_reader_.take(connection, view, admission);
+  return hub_frames_.take(connection, view, admission);
 }
 
 void ConnectionReader::route(Connection& connection, const proto::NextRun& found) {
   const proto::RunView& view = found.run;
-  count(connection, view);
+  count_accepted(state_, connection, view);
   if (proto::load_header(view.bytes).has(proto::kFlagExt)) stamp_arrival(connection, view);
   state_.router.route(state_.receive_buffer.buffer(), view);
-}
-
-void ConnectionReader::count(Connection& connection, const proto::RunView& view) {
-  state_.tally.accepted += view.frames;
-  if (connection.resume) count_taken(connection, view);
-}
-
-void ConnectionReader::count_taken(Connection& connection, const proto::RunView& view) {
-  ResumeState& resume = *connection.resume;
-  resume.taken += view.frames;
-  resume.bytes_since_told += view.size;
-  if (resume.bytes_since_told >= resume.peer_resume_bytes / 4) send_confirm(state_, connection);
 }
 
 /// TRACE gets the time of arrival. The origin of an AGE is in the time of the hub that the frame
@@ -253,97 +233,6 @@ void ConnectionReader::stamp_arrival(const Connection& connection, const proto::
   const std::int64_t now_ns = state_.egress.now_wall_ns;
   proto::adopt_origin(extensions, link != nullptr ? link->clock_ahead_ns : 0, now_ns);
   static_cast<void>(proto::fill_trace(extensions, {state_.shared.hub, now_ns, now_ns}));
-}
-
-bool ConnectionReader::handle_flow(Connection& connection, const proto::RunView& view) {
-  const auto message =
-      proto::flow::decode({view.bytes + proto::kHeaderSize, view.size - proto::kHeaderSize});
-  if (!message && connection.is_link()) {
-    state_.counters.malformed.add(1);
-    return true;
-  }
-  if (!message) {
-    return refuse(connection, proto::DropReason::malformed, proto::GoodbyeCode::malformed,
-                  "malformed FLOW frame: unknown operation, or too short for it");
-  }
-  if (const auto* ping = std::get_if<proto::flow::Ping>(&*message)) on_ping(connection, *ping);
-  if (const auto* confirm = std::get_if<proto::flow::Confirm>(&*message))
-    on_confirm(connection, *confirm);
-  if (const auto* skip = std::get_if<proto::flow::Skip>(&*message))
-    return on_skip(connection, *skip);
-  if (const auto* credit = std::get_if<proto::flow::Credit>(&*message)) {
-    if (!state_.pacer.on_credit(connection, *credit)) return take_bad_credit(connection);
-  }
-  return true;
-}
-
-bool ConnectionReader::take_bad_credit(Connection& connection) {
-  state_.counters.bad_credits.add(1);
-  const Limits& limits = state_.limits;
-  const std::chrono::milliseconds now{state_.now_ms};
-  if (connection.oddities.take({limits.oddities_per_s, limits.oddities_burst}, now)) return true;
-  closer_.close(
-      connection, proto::GoodbyeCode::oddities,
-      "more than " + std::to_string(limits.oddities_burst) +
-          " CREDITs in a short time were for no subscription of this node, or out of order");
-  return false;
-}
-
-void ConnectionReader::on_ping(Connection& connection, const proto::flow::Ping& ping) {
-  send_flow(state_, connection, proto::flow::Pong{ping.sequence, ping.sent_ns, wall_now_ns()});
-  if (connection.resume) send_confirm(state_, connection);
-}
-
-void ConnectionReader::on_confirm(Connection& connection, const proto::flow::Confirm& confirm) {
-  if (!connection.resume) return;
-  const std::uint64_t confirmed = connection.resume->kept.confirm(confirm.count);
-  state_.tally.delivered += confirmed;
-  connection.outbox.counters()->delivered.add(confirmed);
-  state_.tally.queued -= static_cast<std::int64_t>(confirmed);
-  if (confirmed != 0 && connection.progress) connection.progress->block_since_ms = state_.now_ms;
-  state_.recipients.mark_dirty(connection);
-}
-
-bool ConnectionReader::on_skip(Connection& connection, const proto::flow::Skip& skip) {
-  if (!connection.resume || skip.count == proto::flow::kSkipUnknown) return true;
-  // The frames before it may not have been taken, so they must not be confirmed with it.
-  if (connection.gate.has(ReadGate::draining)) return true;
-  std::uint64_t& taken = connection.resume->taken;
-  if (skip.count > UINT64_MAX - 1 - std::min(taken, UINT64_MAX - 1)) {
-    return refuse(connection, proto::DropReason::malformed, proto::GoodbyeCode::malformed,
-                  "SKIP for more frames than there can be");
-  }
-  taken += skip.count;
-  state_.counters.gap_frames.add_within(skip.count, kGapFramesMost);
-  return true;
-}
-
-bool ConnectionReader::handle_link(Connection& connection, const proto::RunView& view) {
-  const std::span<const std::byte> payload(view.bytes + proto::kHeaderSize,
-                                           view.size - proto::kHeaderSize);
-  const auto goodbye = proto::decode<proto::Goodbye>(payload);
-  if (!goodbye) {
-    const auto control = proto::split_control(payload);
-    const bool is_goodbye = control && control->header.operation == proto::Goodbye::kOperation;
-    return refuse(
-        connection, proto::DropReason::malformed, proto::GoodbyeCode::malformed,
-        is_goodbye ? goodbye.error().sentence : "after WELCOME the only LINK message is GOODBYE");
-  }
-  closer_.on_goodbye(connection, goodbye->code, goodbye->sentence);
-  return false;
-}
-
-bool ConnectionReader::handle_control(Connection& connection, const proto::RunView& view) {
-  if (++connection.requests > state_.limits.requests) {
-    closer_.close(connection, proto::GoodbyeCode::too_many_requests,
-                  "more than " + std::to_string(state_.limits.requests) +
-                      " requests are unanswered; wait for answers before asking more");
-    return false;
-  }
-  ControlFrameEvent event{connection.session(), connection.attachment, connection.node, {}};
-  event.frame.assign(view.bytes, view.bytes + view.size);
-  state_.tell_conductor({state_.self, std::move(event)});
-  return true;
 }
 
 void ConnectionReader::begin_mail() {

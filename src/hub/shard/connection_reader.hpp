@@ -1,6 +1,8 @@
 #pragma once
 
 #include "hub/shard/closer.hpp"
+#include "hub/shard/hub_frames.hpp"
+#include "hub/shard/link_reader.hpp"
 #include "hub/shard/shard_state.hpp"
 
 namespace gimnet::hub {
@@ -64,38 +66,15 @@ class ConnectionReader {
   [[nodiscard]] Connection* begun_before(const Connection& connection) const;
   /// May shorten `view` to the frames that it handled.
   [[nodiscard]] bool handle_run(Connection& connection, proto::NextRun& found);
-  [[nodiscard]] bool handle_other(Connection& connection, const proto::RunView& view,
-                                  Admission admission);
-  /// Frames of a link that are not routed. False: the connection was closed.
-  [[nodiscard]] bool handle_from_link(Connection& connection, const proto::RunView& view,
-                                      Admission admission);
-  void pass_on_report(Connection& connection, const proto::RunView& view);
-  void pass_on_flow(Connection& connection, const proto::RunView& view);
-  void drop_from_link(Connection& connection, const proto::RunView& view, proto::DropReason reason);
-  /// Tells the conductor, at most once a second, of a frame that a link should not have sent.
-  void tell_refused(const Connection& connection, const proto::RunView& view);
   void route(Connection& connection, const proto::NextRun& found);
-  [[nodiscard]] bool handle_flow(Connection& connection, const proto::RunView& view);
-  [[nodiscard]] bool handle_link(Connection& connection, const proto::RunView& view);
-  [[nodiscard]] bool handle_control(Connection& connection, const proto::RunView& view);
-  void on_ping(Connection& connection, const proto::flow::Ping& ping);
-  /// False: it was one too many, and the connection was closed.
-  [[nodiscard]] bool take_bad_credit(Connection& connection);
-  void on_confirm(Connection& connection, const proto::flow::Confirm& confirm);
-  /// Like refuse() where it does.
-  [[nodiscard]] bool on_skip(Connection& connection, const proto::flow::Skip& skip);
-  /// Data frames that it sent, admitted.
-  void count(Connection& connection, const proto::RunView& view);
-  void count_taken(Connection& connection, const proto::RunView& view);
   void stamp_arrival(const Connection& connection, const proto::RunView& view);
-  [[nodiscard]] bool refuse(Connection& connection, proto::DropReason reason,
-                            proto::GoodbyeCode code, const std::string& sentence);
 
   ShardState& state_;
   Closer& closer_;
+  HubFrames hub_frames_{state_, closer_};
+  LinkReader link_reader_{state_, hub_frames_};
   std::uint64_t deliveries_end_ = 0;  ///< the router's count at which the share is used up
   Run mail_rest_;
-  std::uint64_t tell_refused_at_ms_ = 0;  ///< the next one is told then
 };
 
 }  // namespace gimnet::hub

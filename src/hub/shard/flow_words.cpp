@@ -24,4 +24,11 @@ void send_confirm(ShardState& state, Connection& connection) {
   state.recipients.mark_dirty(connection);
 }
 
+void note_taken(ShardState& state, Connection& connection, const proto::RunView& view) {
+  ResumeState& resume = *connection.resume;
+  resume.taken += view.frames;
+  resume.bytes_since_told += view.size;
+  if (resume.bytes_since_told >= resume.peer_resume_bytes / 4) send_confirm(state, connection);
+}
+
 }  // namespace gimnet::hub

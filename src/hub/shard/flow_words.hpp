@@ -5,8 +5,10 @@
 #include "hub/shard/connection.hpp"
 #include "hub/shard/shard_state.hpp"
 #include "proto/frame/flow.hpp"
+#include "proto/frame/frame_parser.hpp"
 
-// The FLOW frames that a shard sends to the peer of a connection. Thread safety: one shard.
+// The FLOW frames that a shard sends to the peer of a connection, and the counts that they tell.
+// Thread safety: one shard.
 
 namespace gimnet::hub {
 
@@ -17,5 +19,14 @@ void send_confirm(ShardState& state, Connection& connection);
                              const proto::flow::Message& message);
 /// The same, written with what else goes there in this turn, where there is room.
 void send_flow(ShardState& state, Connection& connection, const proto::flow::Message& message);
+
+/// Counts data frames that were taken from a peer that keeps them until it hears so, and tells it
+/// in time.
+void note_taken(ShardState& state, Connection& connection, const proto::RunView& view);
+/// Counts data frames that the connection sent, whatever becomes of them.
+inline void count_accepted(ShardState& state, Connection& connection, const proto::RunView& view) {
+  state.tally.accepted += view.frames;
+  if (connection.resume) note_taken(state, connection, view);
+}
 
 }  // namespace gimnet::hub

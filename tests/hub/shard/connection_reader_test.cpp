@@ -20,6 +20,7 @@ using ::testing::ElementsAre;
 using testing::FakeNode;
 using testing::FrameSpec;
 using testing::HubRig;
+using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
 TEST(ConnectionReader, CarriesFramesFromOneNodeToAnother) {
@@ -51,91 +52,6 @@ TEST(ConnectionReader, GivesTheSameFramesHoweverTheBytesAreSplit) {
     rig.settle();
     EXPECT_EQ(b.texts(), sent) << "split " << split;
   }
-}
-
-TEST(ConnectionReader, AnswersPingWithPong) {
-  HubRig rig;
-  FakeNode& a = rig.join(0);
-  rig.send_flow(a, proto::flow::Ping{.sequence = 9, .sent_ns = 1234});
-  rig.settle();
-  const auto pongs = a.flow_of<proto::flow::Pong>();
-  ASSERT_THAT(pongs, SizeIs(1));
-  EXPECT_EQ(pongs[0].sequence, 9u);
-  EXPECT_EQ(pongs[0].sent_ns, 1234);
-  EXPECT_GT(pongs[0].now_ns, 0);
-}
-
-TEST(ConnectionReader, TellsTheConductorOfAGoodbye) {
-  HubRig rig;
-  FakeNode& a = rig.join(0);
-  rig.write(a, HubRig::frame(a, 0,
-                             [] {
-                               const auto payload =
-                                   proto::encode(proto::Goodbye{GoodbyeCode::done, "bye"});
-                               return std::string(reinterpret_cast<const char*>(payload.data()),
-                                                  payload.size());
-                             }(),
-                             {.kind = Kind::link, .src = 0}));
-  rig.settle();
-  const auto detached = rig.take_detached();
-  ASSERT_TRUE(detached);
-  EXPECT_TRUE(detached->said_by_peer);
-  EXPECT_EQ(detached->code, GoodbyeCode::done);
-  EXPECT_EQ(detached->sentence, "bye");
-  EXPECT_FALSE(a.goodbye) << "nothing follows a GOODBYE";
-}
-
-TEST(ConnectionReader, HandsControlFramesToTheConductor) {
-  HubRig rig;
-  FakeNode& a = rig.join(0);
-  rig.send(a, 0, "request", {.kind = Kind::ns});
-  rig.settle();
-  auto events = rig.take_events();
-  ASSERT_THAT(events, SizeIs(1));
-  const auto* event = std::get_if<ControlFrameEvent>(&events[0].what);
-  ASSERT_NE(event, nullptr);
-  EXPECT_EQ(event->node, a.id);
-  EXPECT_EQ(event->attachment, 1u);
-  EXPECT_EQ(event->frame.size(), proto::kHeaderSize + 7);
-}
-
-TEST(ConnectionReader, TakesAsManyUnansweredRequestsAsAllowedAndNotOneMore) {
-  Limits limits;
-  limits.requests = 3;
-  HubRig rig(1, limits);
-  FakeNode& a = rig.join(0);
-  for (int i = 0; i < 3; ++i) rig.send(a, 0, "request", {.kind = Kind::ns});
-  rig.settle();
-  EXPECT_FALSE(a.goodbye);
-  SendControlCommand answer{.session = a.session, .attachment = 1, .frame = {}, .answers = 1};
-  answer.frame = HubRig::frame(a, a.id.value(), "answer", {.kind = Kind::ns});
-  rig.command(0, std::move(answer));
-  rig.send(a, 0, "request", {.kind = Kind::ns});
-  rig.settle();
-  EXPECT_FALSE(a.goodbye) << "an answer made room for another request";
-  rig.send(a, 0, "request", {.kind = Kind::ns});
-  rig.settle();
-  ASSERT_TRUE(a.goodbye);
-  EXPECT_EQ(a.goodbye->code, GoodbyeCode::too_many_requests);
-}
-
-TEST(ConnectionReader, CountsRequestsUpToTheLargestLimit) {
-  Limits limits;
-  limits.requests = 65'536;
-  HubRig rig(1, limits);
-  FakeNode& a = rig.join(0);
-  std::vector<std::byte> requests;
-  for (int i = 0; i < 1'024; ++i) {
-    const auto one = HubRig::frame(a, 0, "request", {.kind = Kind::ns});
-    requests.insert(requests.end(), one.begin(), one.end());
-  }
-  for (int i = 0; i < 64; ++i) rig.write(a, requests);
-  rig.settle();
-  EXPECT_FALSE(a.goodbye);
-  rig.send(a, 0, "one more", {.kind = Kind::ns});
-  rig.settle();
-  ASSERT_TRUE(a.goodbye);
-  EXPECT_EQ(a.goodbye->code, GoodbyeCode::too_many_requests);
 }
 
 // Its sender's clock is an hour ahead: it may be as old as it says, and not an hour older.
@@ -232,47 +148,55 @@ TEST(ConnectionReader, MovesARealTimeMessageToLane1WholeOrNotAtAll) {
   EXPECT_THAT(lanes, ::testing::ElementsAre(0, 0, 0, 0, 1, 1, 1, 1, 0));
 }
 
-TEST(ConnectionReader, ClosesForCreditsOfNoUseBeyondTheLimit) {
-  Limits limits;
-  limits.oddities_burst = 3;
-  HubRig rig(1, limits);
-  FakeNode& a = rig.join(0);
-  const auto credit = [&] {
-    rig.send_flow(a, proto::flow::Credit{make_id<GroupId>(HubId{7}, 5), 1});
-    rig.settle();
-  };
-  for (int i = 0; i < 3; ++i) credit();
-  EXPECT_FALSE(a.goodbye);
-  EXPECT_EQ(rig.sum(&ShardCounters::bad_credits), 3u);
-  credit();
-  ASSERT_TRUE(a.goodbye);
-  EXPECT_EQ(a.goodbye->code, GoodbyeCode::oddities);
-  EXPECT_EQ(rig.sum(&ShardCounters::oddities), 1u);
-}
-
-TEST(ConnectionReader, TakesASkipUpToTheLastCountThatThereIs) {
+TEST(ConnectionReader, CarriesTheLargestFrameAndRefusesOneByteMore) {
   HubRig rig;
-  FakeNode& a = rig.join(0, {.resume = true});
-  const auto skip = [&](std::uint64_t count) {
-    rig.send_flow(a, proto::flow::Skip{DropReason::replaced, count});
-    rig.settle();
-  };
-  skip(3);
-  skip(proto::flow::kSkipUnknown);
-  EXPECT_EQ(rig.sum(&ShardCounters::gap_frames), 3u);
-  skip(UINT64_MAX - 1 - 3);
-  EXPECT_FALSE(a.goodbye);
-  EXPECT_EQ(rig.sum(&ShardCounters::gap_frames), kGapFramesMost);
-  // As the hub tells it where the node comes back.
-  rig.send_flow(a, proto::flow::Ping{});
+  FakeNode& a = rig.join(0);
+  FakeNode& b = rig.join(0);
+  const std::string largest(65'536, 'x');
+  rig.send(a, b.id.value(), largest);
   rig.settle();
-  ASSERT_THAT(a.flow_of<proto::flow::Confirm>(), SizeIs(1));
-  EXPECT_EQ(a.flow_of<proto::flow::Confirm>().front().count, UINT64_MAX - 1);
-  skip(1);
+  ASSERT_THAT(b.frames, SizeIs(1));
+  EXPECT_EQ(b.frames[0].text(), largest);
+  rig.send(a, b.id.value(), largest + "y");
+  rig.settle();
   ASSERT_TRUE(a.goodbye);
   EXPECT_EQ(a.goodbye->code, GoodbyeCode::malformed);
   EXPECT_EQ(rig.dropped(DropReason::malformed), 1u);
-  EXPECT_EQ(rig.sum(&ShardCounters::gap_frames), kGapFramesMost);
+  EXPECT_EQ(rig.sum(&ShardCounters::malformed), 1u);
+  EXPECT_TRUE(a.pipe.transport_gone());
+}
+
+TEST(ConnectionReader, ClosesForALengthThatClaimsFourGiB) {
+  for (const std::uint32_t length :
+       {65'537u, 0x7FFF'FFFFu, 0x8000'0000u, 0xFFFF'FFF0u, 0xFFFF'FFFFu}) {
+    HubRig rig;
+    FakeNode& a = rig.join(0);
+    FakeNode& b = rig.join(0);
+    std::vector<std::byte> bytes = HubRig::frame(a, b.id.value(), "x");
+    std::memcpy(bytes.data(), &length, sizeof length);
+    rig.write(a, bytes);
+    rig.settle();
+    ASSERT_TRUE(a.goodbye) << length;
+    EXPECT_EQ(a.goodbye->code, GoodbyeCode::malformed);
+    EXPECT_THAT(b.frames, IsEmpty());
+  }
+}
+
+// Frames before a malformed one were legal when they came, also where all have one header.
+TEST(ConnectionReader, DeliversTheFramesBeforeAMalformedOneOfTheSameHeader) {
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  FakeNode& b = rig.join(0);
+  const FrameSpec keyed{.flags = proto::kFlagKeyed};
+  rig.send(a, b.id.value(), "12345678one", keyed);
+  rig.send(a, b.id.value(), "12345678two", keyed);
+  rig.send(a, b.id.value(), "short", keyed);
+  rig.send(a, b.id.value(), "12345678not", keyed);
+  rig.settle();
+  EXPECT_THAT(b.texts(), ElementsAre("12345678one", "12345678two"));
+  ASSERT_TRUE(a.goodbye);
+  EXPECT_EQ(rig.ledger().accepted, 3u);
+  EXPECT_EQ(rig.dropped(DropReason::malformed), 1u);
 }
 
 }  // namespace
