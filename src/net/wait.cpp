@@ -37,6 +37,12 @@ void WakeSignal::clear() {
   static_cast<void>(!::read(descriptor_, &count, sizeof count));
 }
 
+Deadline WakeSignal::beat(Deadline deadline) const {
+  if (!beat_) return deadline;
+  beat_();
+  return std::min(deadline, steady_now_ns() + kBeatNs);
+}
+
 Readiness wait_for(const Stream* stream, Interest interest, const WakeSignal& wake,
                    Deadline deadline) {
   const auto events =
@@ -47,7 +53,8 @@ Readiness wait_for(const Stream* stream, Interest interest, const WakeSignal& wa
   std::array<pollfd, 2> waits{{{wake.descriptor(), POLLIN, 0}, {descriptor, events, 0}}};
   Readiness ready;
   ready.readable = interest.read && stream != nullptr && stream->pending_in() != 0;
-  const int timeout_ms = ready.readable ? 0 : poll_timeout_ms(deadline);
+  const Deadline until = wake.beat(deadline);
+  const int timeout_ms = ready.readable ? 0 : poll_timeout_ms(until);
   if (::poll(waits.data(), waits.size(), timeout_ms) <= 0) return ready;
   ready.woken = waits[0].revents != 0;
   const bool broken = (waits[1].revents & (POLLERR | POLLHUP | POLLNVAL)) != 0;
@@ -58,7 +65,8 @@ Readiness wait_for(const Stream* stream, Interest interest, const WakeSignal& wa
 
 Raised wait_for_either(const WakeSignal& one, const WakeSignal& other, Deadline deadline) {
   std::array<pollfd, 2> waits{{{one.descriptor(), POLLIN, 0}, {other.descriptor(), POLLIN, 0}}};
-  if (::poll(waits.data(), waits.size(), poll_timeout_ms(deadline)) <= 0) return {};
+  const Deadline until = other.beat(deadline);
+  if (::poll(waits.data(), waits.size(), poll_timeout_ms(until)) <= 0) return {};
   return {waits[0].revents != 0, waits[1].revents != 0};
 }
 

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <utility>
 
 #include "base/clock.hpp"
 #include "net/stream.hpp"
@@ -26,8 +28,16 @@ class WakeSignal {
   void raise();
   void clear();
 
+  /// A thread that waits for the signal calls this now and then, kBeatNs apart at most: it has
+  /// other work that can't wait until a dial has ended. REQUIRES: one thread waits, and sets it.
+  void set_beat(std::function<void()> beat) { beat_ = std::move(beat); }
+  static constexpr std::int64_t kBeatNs = 50 * kNsPerMs;
+  /// Gives the waiting thread its beat. The deadline, or an earlier one, by which the next is due.
+  [[nodiscard]] Deadline beat(Deadline deadline) const;
+
  private:
   const int descriptor_;
+  std::function<void()> beat_;
 };
 
 struct Readiness {
@@ -37,7 +47,8 @@ struct Readiness {
 };
 
 /// Waits until the stream is ready for what is asked, the signal is raised, or the deadline. Bytes
-/// that the stream keeps are there without a wait. Null: only the signal counts.
+/// that the stream keeps are there without a wait. Null: only the signal counts. If the signal has
+/// a beat, the wait may end before the deadline.
 [[nodiscard]] Readiness wait_for(const Stream* stream, Interest interest, const WakeSignal& wake,
                                  Deadline deadline);
 
@@ -45,7 +56,7 @@ struct Raised {
   bool one = false;
   bool other = false;
 };
-/// Waits until one of them is raised, or the deadline; maybe less.
+/// Waits until one of them is raised, or the deadline; maybe less. `other` may have a beat.
 [[nodiscard]] Raised wait_for_either(const WakeSignal& one, const WakeSignal& other,
                                      Deadline deadline);
 

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "base/clock.hpp"
-#include "base/signals_blocked.hpp"
 #include "client/gimi/inbox.hpp"
 #include "client/gimi/open_requests.hpp"
 #include "client/gimi/stream_table.hpp"
@@ -55,9 +54,8 @@ AckBook::Entry AckBook::acknowledge(const StreamName& sender) {
   return found->second;
 }
 
-bool AckBook::hold(const StreamName& sender) {
-  const auto found = entries_.find(sender);
-  return found == entries_.end() || std::exchange(found->second.due, true);
+void AckBook::hold(const StreamName& sender) {
+  if (const auto found = entries_.find(sender); found != entries_.end()) found->second.due = true;
 }
 
 namespace {
@@ -73,37 +71,24 @@ constexpr std::int64_t kLastAcksNs = 500'000'000;
 
 }  // namespace
 
-void Clerk::start() {
-  const SignalsBlocked blocked;
-  thread_ = std::thread([this] { run(); });
-}
-
 void Clerk::stop() {
+  // Partner: run(), which sees it at the turn for which it is roused.
+  give_up_ns_.store(steady_now_ns() + kLastAcksNs);
+  uplink_.rouse();
   {
     const MutexLock lock(mutex_);
-    stopping_ = true;
+    while (!stopped_) static_cast<void>(done_.wait_until(mutex_, INT64_MAX));
   }
-  work_.notify_all();
-  if (thread_.joinable()) thread_.join();
+  uplink_.set_task({});
 }
 
 void Clerk::take(const StreamName& sender, Lane lane, const proto::gimi::MessageHeader& data) {
-  {
-    const MutexLock lock(mutex_);
-    if (!book_.take(sender, data)) return;
-    due_.push_back({sender, lane});
-    if (due_.size() != 1) return;
-  }
-  work_.notify_one();
+  if (book_.take(sender, data)) due_.push_back({sender, lane});
 }
 
 nif_status Clerk::acknowledge(const StreamName& sender, Lane lane,
                               const proto::gimi::MessageHeader& ping) {
-  AckBook::Entry taken;
-  {
-    const MutexLock lock(mutex_);
-    taken = book_.acknowledge(sender);
-  }
+  AckBook::Entry taken = book_.acknowledge(sender);
   // Nothing was taken of the epoch of which it asks.
   if (taken.epoch != ping.epoch) taken = {.epoch = ping.epoch};
   return send_ack(sender, lane, taken, ping.sequence);
@@ -121,74 +106,51 @@ nif_status Clerk::send_ack(const StreamName& sender, Lane lane, AckBook::Entry t
 }
 
 void Clerk::attend(bool at_once) {
-  {
-    const MutexLock lock(mutex_);
-    if (ticking_ && !at_once) return;
-    ticking_ = true;
-    hurry_ = hurry_ || at_once;
-  }
-  work_.notify_one();
+  // Partner: tick(), which takes these back before it looks. So nothing is missed that was there
+  // before the call.
+  const bool wanted = at_once ? hurry_.exchange(true) : ticking_.exchange(true);
+  if (!wanted) uplink_.rouse();
 }
 
-void Clerk::wait_for_work(std::int64_t& tick_at, bool paused) {
-  const std::int64_t retry_at = paused ? steady_now_ns() + kRetryNs : INT64_MAX;
-  for (;;) {
-    if (!ticking_) {
-      tick_at = INT64_MAX;
-    } else if (tick_at == INT64_MAX) {
-      tick_at = steady_now_ns() + kTickNs;
-    }
-    if (std::exchange(hurry_, false)) tick_at = 0;
-    // The streams are looked after however many ACKs are due, or wait for their way.
-    if (!due_.empty() || (stopping_ && !paused)) return;
-    const std::int64_t until = std::min(tick_at, retry_at);
-    if (steady_now_ns() >= until) return;
-    static_cast<void>(work_.wait_until(mutex_, until));
+net::Deadline Clerk::run() {
+  const std::int64_t give_up_ns = give_up_ns_.load();
+  const bool idle = due_.empty() && paused_.empty() && give_up_ns == INT64_MAX;
+  if (idle && !ticking_.load() && !hurry_.load() && tick_at_ns_ == INT64_MAX) return net::kNever;
+  if (!due_.empty() || steady_now_ns() >= retry_at_ns_) send_due();
+  const std::int64_t now = steady_now_ns();
+  tick(now);
+  if (give_up_ns != INT64_MAX && (paused_.empty() || now >= give_up_ns)) {
+    const MutexLock lock(mutex_);
+    stopped_ = true;
+    done_.notify_all();
   }
+  // Its own work may want a look at once.
+  return hurry_.load() ? now : std::min(tick_at_ns_, retry_at_ns_);
 }
 
-void Clerk::run() {
-  std::vector<Due> due;
-  std::vector<Due> paused;
-  std::int64_t tick_at = INT64_MAX;
-  std::int64_t give_up_at = INT64_MAX;
-  for (;;) {
-    {
-      const MutexLock lock(mutex_);
-      wait_for_work(tick_at, !paused.empty());
-      if (stopping_ && give_up_at == INT64_MAX) give_up_at = steady_now_ns() + kLastAcksNs;
-      if (stopping_ && due_.empty() && (paused.empty() || steady_now_ns() >= give_up_at)) return;
-      due.swap(due_);
-    }
-    due.insert(due.end(), paused.begin(), paused.end());
-    paused.clear();
-    send_due(due);
-    paused.swap(due);
-    const std::int64_t now = steady_now_ns();
-    if (now < tick_at) continue;
-    tick_at = now + kTickNs;
-    const bool streams = streams_.tick(now);
-    const bool requests = requests_ != nullptr && requests_->tick(now);
-    const bool silences = inbox_ != nullptr && inbox_->tick();
-    const MutexLock lock(mutex_);
-    if (!streams && !requests && !silences && !hurry_) ticking_ = false;
-  }
+void Clerk::tick(std::int64_t now_ns) {
+  if (tick_at_ns_ == INT64_MAX && ticking_.load()) tick_at_ns_ = now_ns + kTickNs;
+  if (!hurry_.exchange(false) && now_ns < tick_at_ns_) return;
+  ticking_.store(false);
+  const bool streams = streams_.tick(now_ns);
+  const bool requests = requests_ != nullptr && requests_->tick(now_ns);
+  const bool silences = inbox_ != nullptr && inbox_->tick();
+  const bool more = streams || requests || silences;
+  if (more) ticking_.store(true);
+  tick_at_ns_ = more ? now_ns + kTickNs : INT64_MAX;
 }
 
-void Clerk::send_due(std::vector<Due>& due) {
-  std::size_t kept = 0;
-  std::erase_if(due, [this, &kept](const Due& ack) {
-    AckBook::Entry taken;
-    {
-      const MutexLock lock(mutex_);
-      taken = book_.acknowledge(ack.sender);
-    }
-    if (send_ack(ack.sender, ack.lane, taken, 0) != NIF_TIMEOUT) return true;
-    const MutexLock lock(mutex_);
-    if (kept == kPausedAcksMax || book_.hold(ack.sender)) return true;
-    ++kept;
-    return false;
-  });
+void Clerk::send_due() {
+  due_.insert(due_.end(), paused_.begin(), paused_.end());
+  paused_.clear();
+  for (const Due& ack : due_) {
+    if (send_ack(ack.sender, ack.lane, book_.acknowledge(ack.sender), 0) != NIF_TIMEOUT) continue;
+    if (paused_.size() == kPausedAcksMax) continue;
+    book_.hold(ack.sender);
+    paused_.push_back(ack);
+  }
+  due_.clear();
+  retry_at_ns_ = paused_.empty() ? INT64_MAX : steady_now_ns() + kRetryNs;
 }
 
 }  // namespace gimnet::gimi

@@ -1,15 +1,16 @@
 #pragma once
 
+#include <atomic>
 #include <compare>
 #include <cstddef>
 #include <cstdint>
 #include <map>
-#include <thread>
 #include <vector>
 
 #include "base/mutex.hpp"
 #include "client/gimi/uplink.hpp"
 #include "gimnet/gimi/message.hpp"
+#include "net/wait.hpp"
 #include "proto/gimi/message_header.hpp"
 
 namespace gimnet::gimi {
@@ -52,8 +53,8 @@ class AckBook {
   };
   /// The messages to acknowledge now; they are no longer due. Zeros if nothing came from there.
   Entry acknowledge(const StreamName& sender);
-  /// An acknowledgement could not be sent: it stays due. True: it had become due anew.
-  bool hold(const StreamName& sender);
+  /// An acknowledgement could not be sent: it stays due.
+  void hold(const StreamName& sender);
   [[nodiscard]] std::size_t size() const { return entries_.size(); }
 
  private:
@@ -64,9 +65,10 @@ class Inbox;
 class OpenRequests;
 class StreamTable;
 
-/// A node's own thread: acknowledges what was taken, one ACK for as many messages as came
-/// meanwhile, lets streams ask for the ACKs that they miss, sends requests again, and tells wait
-/// sets of silence. It sleeps while there is nothing to do. Thread safety: any thread.
+/// The work of a node that is due at times, on NIF's thread: acknowledges what was taken, one ACK
+/// for as many messages as came meanwhile, lets streams ask for the ACKs that they miss, sends
+/// requests again, and tells wait sets of silence. It never waits: what has no room is tried again.
+/// Thread safety: as each group of functions says.
 class Clerk {
  public:
   /// `requests` and `inbox` may be null.
@@ -74,48 +76,59 @@ class Clerk {
         Inbox* inbox = nullptr)
       : uplink_(uplink), streams_(streams), requests_(requests), inbox_(inbox) {}
 
-  void start();
-  /// Sends the ACKs that are due, and ends the thread. REQUIRES: not from the clerk's own thread.
+  // Any thread but NIF's.
+  /// From now on NIF's thread does the work. REQUIRES: the uplink is open.
+  void start() {
+    uplink_.set_task([this] { return run(); });
+  }
+  /// Waits until the ACKs that are due are sent, and ends the work. REQUIRES: started.
   void stop() GIMNET_EXCLUDES(mutex_);
 
-  /// A DATA that asked for an ACK is in its queue.
-  void take(const StreamName& sender, Lane lane, const proto::gimi::MessageHeader& data)
-      GIMNET_EXCLUDES(mutex_);
-  /// Sends the ACK that goes before the PONG for that PING, from the thread of the caller. Does not
-  /// wait.
-  [[nodiscard]] nif_status acknowledge(const StreamName& sender, Lane lane,
-                                       const proto::gimi::MessageHeader& ping)
-      GIMNET_EXCLUDES(mutex_);
+  // Any thread.
   /// Streams want to be looked after, soon or at once.
-  void attend(bool at_once) GIMNET_EXCLUDES(mutex_);
+  void attend(bool at_once);
+
+  // NIF's thread.
+  /// A DATA that asked for an ACK is in its queue.
+  void take(const StreamName& sender, Lane lane, const proto::gimi::MessageHeader& data);
+  /// Sends the ACK that goes before the PONG for that PING. Does not wait.
+  [[nodiscard]] nif_status acknowledge(const StreamName& sender, Lane lane,
+                                       const proto::gimi::MessageHeader& ping);
 
  private:
   struct Due {
     StreamName sender;
     Lane lane;
   };
-  void run();
+  /// Does what is due. Returns when it has to be called again at the latest.
+  [[nodiscard]] net::Deadline run() GIMNET_EXCLUDES(mutex_);
   /// `pong`: the number of the PONG that follows, or 0.
   [[nodiscard]] nif_status send_ack(const StreamName& sender, Lane lane, AckBook::Entry taken,
                                     std::uint32_t pong) const;
-  /// `paused`: an ACK is to be tried again.
-  void wait_for_work(std::int64_t& tick_at, bool paused) GIMNET_REQUIRES(mutex_);
-  /// Keeps in `due` what could not be sent because the hub has paused its way.
-  void send_due(std::vector<Due>& due);
+  /// Keeps in `paused_` what could not be sent because the hub has paused its way.
+  void send_due();
+  /// Looks after the streams, requests and queues if it is time.
+  void tick(std::int64_t now_ns);
 
   Uplink& uplink_;
   StreamTable& streams_;
   OpenRequests* const requests_;
   Inbox* const inbox_;
-  std::thread thread_;
+
+  // NIF's thread.
+  AckBook book_;
+  std::vector<Due> due_;
+  std::vector<Due> paused_;
+  std::int64_t retry_at_ns_ = INT64_MAX;  ///< of those
+  std::int64_t tick_at_ns_ = INT64_MAX;   ///< the next look at the streams; never: none is wanted
+
+  std::atomic<bool> ticking_{false};  ///< somebody wants looks, until one finds nothing
+  std::atomic<bool> hurry_{false};    ///< the next look is to be at once
+  std::atomic<std::int64_t> give_up_ns_{INT64_MAX};  ///< when stop() waits no longer for ACKs
 
   Mutex mutex_;
-  Condition work_;
-  AckBook book_ GIMNET_GUARDED_BY(mutex_);
-  std::vector<Due> due_ GIMNET_GUARDED_BY(mutex_);
-  bool ticking_ GIMNET_GUARDED_BY(mutex_) = false;
-  bool hurry_ GIMNET_GUARDED_BY(mutex_) = false;
-  bool stopping_ GIMNET_GUARDED_BY(mutex_) = false;
+  Condition done_;
+  bool stopped_ GIMNET_GUARDED_BY(mutex_) = false;
 };
 
 }  // namespace gimnet::gimi

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <utility>
 
 #include "base/clock.hpp"
 #include "base/random.hpp"
@@ -115,6 +116,14 @@ void Uplink::credit(const TakenMessages& taken, bool more) const {
 
 void Uplink::deliver() const {
   if (nif::Node* const direct = direct_.load()) direct->deliver_again();
+}
+
+void Uplink::set_task(std::function<net::Deadline()> task) const {
+  if (nif::Node* const direct = direct_.load()) direct->set_task(std::move(task));
+}
+
+void Uplink::rouse() const {
+  if (nif::Node* const direct = direct_.load()) direct->rouse();
 }
 
 std::optional<nif::HubClock::OwnTime> Uplink::own_time(std::int64_t hub_ns) const {

@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -13,6 +14,7 @@
 #include "gimnet/gimi/message.hpp"
 #include "gimnet/gimi/outcome.hpp"
 #include "gimnet/nif.h"
+#include "net/wait.hpp"
 #include "proto/gimi/message_header.hpp"
 
 namespace gimnet::nif {
@@ -77,6 +79,9 @@ class Uplink {
   /// As nif_credit() and nif_deliver().
   void credit(const TakenMessages& taken, bool more) const;
   void deliver() const;
+  /// As Node::set_task() and Node::rouse().
+  void set_task(std::function<net::Deadline()> task) const;
+  void rouse() const;
 
   /// As HubClock::own_time().
   [[nodiscard]] std::optional<nif::HubClock::OwnTime> own_time(std::int64_t hub_ns) const;

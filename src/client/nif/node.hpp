@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -73,6 +74,14 @@ class Node final : private InboundHost {
   void deliver_again();
   /// The calling thread is this node's library thread.
   [[nodiscard]] bool in_callback() const;
+  /// Work of the layer above on the library's thread at the end of each turn. Must not wait:
+  /// send() from that thread does not. Returns when it has to be called again at the latest.
+  using Task = std::function<Deadline()>;
+  /// The library's thread runs this from its next turn on; empty: none. When this returns, the
+  /// former one is not running and will not. REQUIRES: not from a task.
+  void set_task(Task task) GIMNET_EXCLUDES(task_mutex_);
+  /// Something is due earlier than the task said.
+  void rouse() { wake_.raise(); }
 
   /// Makes every waiting call leave with NIF_CLOSED, now and from now on.
   void begin_close();
@@ -116,6 +125,7 @@ class Node final : private InboundHost {
   void on_timers(std::int64_t now, bool reading);
   [[nodiscard]] Deadline next_timer(bool reading, std::int64_t last_write_ns) const;
   void call_back();
+  void run_task() GIMNET_EXCLUDES(task_mutex_);
   [[nodiscard]] std::size_t call_back_with(std::span<const Item> items);
   void confirm();
   void redial();
@@ -162,6 +172,10 @@ class Node final : private InboundHost {
   std::atomic<bool> closing_{false};
   std::atomic<std::uint32_t> deliver_calls_{0};
   std::atomic<std::uint32_t> owners_{1};
+  std::atomic<bool> has_task_{false};
+
+  Mutex task_mutex_;  ///< held while it runs
+  Task task_ GIMNET_GUARDED_BY(task_mutex_);
 
   Mutex mutex_;
   nif_info info_ GIMNET_GUARDED_BY(mutex_){};
@@ -196,6 +210,7 @@ class Node final : private InboundHost {
   bool resumes_only_ = false;  ///< the next connection has to resume the session ...
   std::int64_t broke_ns_ = 0;  ///< ... whose last one broke then
   bool ended_ = false;
+  Deadline task_at_ = kNever;  ///< the task runs then at the latest
   std::array<Item, 64>
       in_hand_;                ///< taken out of the receive queue under one lock, for the callback
   bool held_ = false;          ///< the callback said NIF_NOT_NOW ...

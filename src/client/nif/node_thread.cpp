@@ -42,11 +42,13 @@ bool Node::in_callback() const { return t_node == this; }
 
 void Node::run() {
   t_node = this;
+  stop_.set_beat([this] { run_task(); });  // no silent hub makes it late
   while (!closing_.load()) {
     try {
       if (ended_) {
         call_back();
-        const net::Readiness ready = net::wait_for(nullptr, {}, wake_, kNever);
+        run_task();
+        const net::Readiness ready = net::wait_for(nullptr, {}, wake_, task_at_);
         if (ready.woken) wake_.clear();
       } else if (stream_ != nullptr) {
         turn();
@@ -54,8 +56,7 @@ void Node::run() {
         redial();
       }
     } catch (const std::bad_alloc&) {
-      // Half a step may be done: only a new epoch is sure to be right.
-      epoch_ = random_bits() | 1;
+      epoch_ = random_bits() | 1;  // half a step may be done: only a new one is sure to be right
       session_.hub_epoch = 0;
       disconnect("the library ran out of memory", proto::GoodbyeCode::no_memory);
     }
@@ -86,7 +87,7 @@ void Node::turn() {
     disconnect("the connection to the hub broke while writing", proto::GoodbyeCode::done);
     return;
   }
-  const Deadline until = next_timer(reading, wants.last_write_ns);
+  const Deadline until = std::min(next_timer(reading, wants.last_write_ns), task_at_);
   const net::Interest interest = net::interest_of(reading, wants.blocked, wants.pending_out);
   const net::Readiness ready = net::wait_for(stream_.get(), interest, wake_, until);
   if (ready.woken) wake_.clear();
@@ -102,6 +103,22 @@ void Node::turn() {
     received_.push(declarations_.take_events());
   }
   call_back();
+  run_task();
+}
+
+void Node::set_task(Task task) {
+  {
+    const MutexLock lock(task_mutex_);
+    has_task_.store(task != nullptr);
+    task_ = std::move(task);
+  }
+  rouse();
+}
+
+void Node::run_task() {
+  if (!has_task_.load()) return;  // a turn of a program of NIF costs no lock
+  const MutexLock lock(task_mutex_);
+  task_at_ = task_ ? task_() : kNever;
 }
 
 void Node::read_some(std::int64_t now) {
@@ -215,9 +232,10 @@ std::size_t Node::call_back_with(std::span<const Item> items) {
 void Node::redial() {
   const Deadline wait_until = steady_now_ns() + backoff_.next_ns(random_bits());
   while (!closing_.load() && steady_now_ns() < wait_until) {
-    const net::Readiness ready = net::wait_for(nullptr, {}, wake_, wait_until);
+    const net::Readiness ready = net::wait_for(nullptr, {}, wake_, std::min(wait_until, task_at_));
     if (ready.woken) wake_.clear();
     call_back();
+    run_task();
   }
   if (closing_.load()) return;
   take_new_name();

@@ -1,11 +1,14 @@
 #include <gtest/gtest.h>
+#include <poll.h>
 
+#include <atomic>
 #include <chrono>
 #include <string>
 #include <string_view>
 #include <thread>
 #include <vector>
 
+#include "client/nif/handles.hpp"
 #include "client/nif/node.hpp"
 #include "proto/frame/extensions.hpp"
 #include "tests/client/nif/support/fake_hub.hpp"
@@ -79,6 +82,58 @@ TEST(NodeThread, ConfirmsWithEveryKeepAliveAndEachQuarter) {
   confirm = connected.hub.next_flow<proto::flow::Confirm>();
   ASSERT_TRUE(confirm);
   EXPECT_EQ(confirm->count, 2u);
+}
+
+/// Counts its runs, and wants the next one in a millisecond.
+class CountingTask {
+ public:
+  explicit CountingTask(nif_node* node) : node_(share_node(node)) {
+    node_->set_task([this] {
+      runs_.fetch_add(1);
+      return steady_now_ns() + kNsPerMs;
+    });
+  }
+  ~CountingTask() {
+    node_->set_task({});
+    node_->drop();
+  }
+  CountingTask(const CountingTask&) = delete;
+  CountingTask& operator=(const CountingTask&) = delete;
+  /// Waits for so many more. False: not within kPatience, or the hub's end hears something first.
+  bool runs(int more, const FakeConnection& hub) const {
+    const int wanted = runs_.load() + more;
+    const Deadline until = steady_now_ns() + std::chrono::nanoseconds(kPatience).count();
+    while (runs_.load() < wanted && steady_now_ns() < until) {
+      pollfd heard{hub.descriptor(), POLLIN, 0};
+      if (::poll(&heard, 1, 1) > 0) return false;
+    }
+    return runs_.load() >= wanted;
+  }
+
+ private:
+  Node* const node_;
+  std::atomic<int> runs_{0};
+};
+
+TEST(NodeThread, RunsATaskWhenItIsDue) {
+  FakeHub hub;
+  proto::Welcome welcome = make_welcome();
+  welcome.keep_alive_ms = 60'000;
+  const Connected connected = connect_to(hub, default_options(), welcome);
+  const CountingTask task(connected.node.get());
+  EXPECT_TRUE(task.runs(3, connected.hub)) << "nothing else wakes the thread";
+}
+
+TEST(NodeThread, RunsATaskWhileAHubDoesNotAnswer) {
+  FakeHub hub;
+  nif_options options = default_options();
+  options.no_reconnect = 0;
+  Connected connected = connect_to(hub, options, make_welcome());
+  const CountingTask task(connected.node.get());
+  connected.hub.close();
+  FakeConnection silent = hub.accept();
+  ASSERT_TRUE(silent.read_hello());
+  EXPECT_TRUE(task.runs(3, silent)) << "before it gives up";
 }
 
 TEST(NodeThread, LeavesAHubThatIsSilent) {
