@@ -23,10 +23,9 @@ class Process:
     end()."""
 
     def __init__(self, arguments, stdin=subprocess.DEVNULL, env=None, stdout=subprocess.PIPE):
-        environment = dict(os.environ)
-        environment.pop("GIMNET_HUB", None)
-        environment.pop("GIMNET_PROXY", None)
-        environment.pop("STATE_DIRECTORY", None)
+        # What a test of a library needs (LD_PRELOAD) is not for programs.
+        unwanted = ("GIMNET_HUB", "GIMNET_PROXY", "STATE_DIRECTORY", "LD_PRELOAD")
+        environment = {name: value for name, value in os.environ.items() if name not in unwanted}
         environment.update({"XDG_RUNTIME_DIR": HOME.name, "XDG_STATE_HOME": HOME.name}, **(env or {}))
         self.popen = subprocess.Popen(arguments, stdin=stdin, stdout=stdout, stderr=subprocess.PIPE, env=environment)
         self._out, self._err = bytearray(), bytearray()
