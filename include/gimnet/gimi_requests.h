@@ -37,7 +37,8 @@ typedef struct gimi_request_options {
   int32_t timeout_ms; /**< Until the request ends; 0: 5,000. */
   gimi_lane lane;     /**< Of the request and its answer. */
   /** Not 0: the work may be done twice. A request whose fate nobody knows after a break of the
-   * connection is asked again. */
+   * connection is asked again; and if the program that was asked has gone, the next one that has
+   * the service within 2 s is asked. */
   uint8_t repeat;
   uint8_t reserved[7];
 } gimi_request_options;
@@ -66,7 +67,8 @@ typedef struct gimi_reply {
 GIMNET_API gimi_status gimi_ask(gimi_handle node, const char* service, const gimi_bytes* data,
                                 const gimi_request_options* options, gimi_reply* reply);
 /** Asks and does not wait for the end, only for the hub to say where the service is. A request that
- * could not be sent is an error here. gimi_close() of the handle cancels: no reply will come. */
+ * could not be sent is an error here. gimi_close() of the handle cancels: no reply will come. Calls
+ * that wait end with GIMI_CLOSED [no if it was not sent, else maybe]. */
 GIMNET_API gimi_status gimi_ask_later(gimi_handle node, const char* service, const gimi_bytes* data,
                                       const gimi_request_options* options, gimi_handle* pending);
 /** Waits for the end of a request, which it gives once, as gimi_ask(). GIMI_TIMEOUT with

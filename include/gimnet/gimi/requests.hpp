@@ -20,7 +20,8 @@ enum class Ran : std::int32_t { no = GIMI_RAN_NO, maybe = GIMI_RAN_MAYBE, yes = 
 
 struct RequestOptions {
   Lane lane = Lane::normal;
-  /// The work may be done twice: a request whose fate nobody knows after a break is asked again.
+  /// The work may be done twice: a request whose fate nobody knows after a break is asked again,
+  /// and the next program that has the service is asked if the first one has gone.
   bool repeat = false;
 };
 

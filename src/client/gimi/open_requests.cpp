@@ -43,6 +43,10 @@ Ended reply_of(const proto::gimi::RequestError& error, const std::string& servic
                        words + "nobody there knows what became of the request");
 }
 
+Ended gone(const std::string& service) {
+  return without_reply(Status::gone, Ran::maybe, service + ": the program that was asked has gone");
+}
+
 /// The way there may be back soon.
 bool may_come_back(std::uint32_t reason) {
   switch (static_cast<proto::DropReason>(reason)) {
@@ -185,7 +189,11 @@ std::optional<Ended> OpenRequests::wait(std::uint32_t number, std::int64_t until
   const MutexLock lock(mutex_);
   for (;;) {
     const auto found = open_.find(number);
-    if (found == open_.end()) return without_reply(Status::closed, Ran::maybe, "it has ended");
+    const bool cancelled = left != nullptr && *left;
+    if (found == open_.end()) {
+      return without_reply(Status::closed, Ran::maybe,
+                           cancelled ? "the request was cancelled" : "it has ended");
+    }
     Open& open = found->second;
     if (!open.reply && is_over(open.deadline_ns)) time_out(open);
     if (open.reply) {
@@ -193,7 +201,8 @@ std::optional<Ended> OpenRequests::wait(std::uint32_t number, std::int64_t until
       open_.erase(found);
       return reply;
     }
-    if ((left != nullptr && *left) || is_over(until_ns)) return std::nullopt;
+    if (cancelled) return without_reply(Status::closed, open.ran(), "the request was cancelled");
+    if (is_over(until_ns)) return std::nullopt;
     static_cast<void>(ended_.wait_until(mutex_, std::min(until_ns, open.deadline_ns)));
   }
 }
@@ -282,8 +291,7 @@ void OpenRequests::on_service_moved(const std::string& service, const ServicePla
       if (open.service != service || open.reply) continue;
       const bool same = place.provider == open.provider && place.session == open.session;
       if (open.may_have_come() && !(is_there && same)) {
-        finish(open, without_reply(Status::gone, Ran::maybe,
-                                   service + ": the program that was asked has gone"));
+        ask_the_next(open, is_there);
       } else if (is_there && open.again_ns != 0) {
         open.again_ns = steady_now_ns();
       }
@@ -291,6 +299,12 @@ void OpenRequests::on_service_moved(const std::string& service, const ServicePla
     ended_.notify_all();  // wait_for_place()
   }
   attend_();
+}
+
+void OpenRequests::ask_the_next(Open& open, bool is_there) {
+  if (!open.repeat) return finish(open, gone(open.service));
+  if (is_there) open.give_up_ns = 0;
+  open.again_ns = steady_now_ns();
 }
 
 void OpenRequests::on_broken() {
@@ -335,8 +349,9 @@ bool OpenRequests::tick(std::int64_t now_ns) {
       if (auto sending = prepare(number, open, now_ns)) {
         due.emplace_back(number, std::move(*sending));
       } else {
-        retry(open,
-              without_reply(Status::not_found, open.ran(), open.service + ": nobody answers"));
+        retry(open, open.may_have_come() ? gone(open.service)
+                                         : without_reply(Status::not_found, Ran::no,
+                                                         open.service + ": nobody answers"));
       }
     }
   }

@@ -62,7 +62,8 @@ class OpenRequests {
   [[nodiscard]] Outcome<std::uint32_t> open(const std::string& service, BytesView data,
                                             std::int64_t deadline_ns, const RequestOptions& options)
       GIMNET_EXCLUDES(mutex_);
-  /// The end of a request, once; nothing if it has not ended by then. `left`: as Inbox::receive().
+  /// The end of a request, once; nothing if it has not ended by then. `left`: set by leave(), in
+  /// which case the answer is `closed`.
   [[nodiscard]] std::optional<Ended> wait(std::uint32_t number, std::int64_t until_ns,
                                           const std::atomic<bool>* left = nullptr)
       GIMNET_EXCLUDES(mutex_);
@@ -130,6 +131,8 @@ class OpenRequests {
   void time_out(Open& open) GIMNET_REQUIRES(mutex_);
   /// It found no way: sends it again soon, or ends it if that went on for too long.
   void retry(Open& open, Ended otherwise) GIMNET_REQUIRES(mutex_);
+  /// The program that was asked has gone. One that may be done twice waits for the next one.
+  void ask_the_next(Open& open, bool is_there) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool knows_locked(const std::string& service) const GIMNET_REQUIRES(mutex_);
   [[nodiscard]] Open* find(const proto::gimi::MessageHeader& header, Peer from)
       GIMNET_REQUIRES(mutex_);

@@ -183,6 +183,16 @@ TEST_F(OpenRequestsTest, AnotherProgramOfThatNameIsAskedNext) {
   answering.join();
 }
 
+TEST(OpenRequests, OneThatIsCancelledSaysWhetherItWasDone) {
+  gimi::Uplink uplink;
+  OpenRequests requests(uplink, [] {});
+  const std::uint32_t number = requests.open("calc/add", {}, INT64_MAX, {}).or_throw();
+  const std::atomic<bool> left{true};
+  EXPECT_EQ(requests.wait(number, INT64_MAX, &left)->ran, Ran::no) << "it was never sent";
+  requests.cancel(number);
+  EXPECT_EQ(requests.wait(number, INT64_MAX, &left)->ran, Ran::maybe);
+}
+
 TEST_F(OpenRequestsTest, ManyAtOnceGetTheirOwnReplies) {
   constexpr int kThreads = 4;
   constexpr int kRequests = 200;
@@ -225,10 +235,11 @@ class RequestsAtAFakeHub : public gimi::test::Conversation {
     hub_.close();
   }
 
-  void ask() {
-    asking_ = std::thread([this] { reply_.emplace(node_->request("calc/add", "1 2", kWait)); });
+  void ask(bool repeat = false) {
+    asking_ = std::thread([this, repeat] {
+      reply_.emplace(node_->request("calc/add", "1 2", kWait, {.repeat = repeat}));
+    });
   }
-  /// Waits for the end of the request.
   const Reply& reply() {
     if (asking_.joinable()) asking_.join();
     return *reply_;
@@ -285,8 +296,8 @@ class RequestsAtAFakeHub : public gimi::test::Conversation {
     return *frame;
   }
   /// It was asked, and the hub has its first copy.
-  gimi::test::Frame begin() {
-    ask();
+  gimi::test::Frame begin(bool repeat = false) {
+    ask(repeat);
     answer_listing(true);
     answer_subscribe();
     return next_request();
@@ -352,6 +363,16 @@ TEST_F(RequestsAtAFakeHub, AnotherSessionUnderTheSameGroupIsAnotherProgram) {
   answer_subscribe(kSession + 1);
   EXPECT_TRUE(reply().is(Status::gone));
   EXPECT_EQ(reply().ran(), Ran::maybe);
+}
+
+TEST_F(RequestsAtAFakeHub, OneThatMayBeDoneTwiceIsAskedOfTheNextProgram) {
+  begin(true);
+  break_connection();
+  answer_subscribe(kSession + 1);
+  next_request();
+  EXPECT_EQ(flags_, kFlagAgain | proto::gimi::kFlagRepeat);
+  answer({sequence_, MessageOperation::reply, 0, 0}, std::as_bytes(std::span("3", 1)));
+  EXPECT_EQ(reply().text(), "3") << reply().failure().sentence;
 }
 
 TEST_F(RequestsAtAFakeHub, NobodyIsSaidWhenNoNameIsOnItsWay) {
