@@ -66,7 +66,6 @@ class Witness final : public InboundHost {
     note("watched " + std::to_string(events.watch));
     return true;
   }
-  void on_name_lost(const std::string& name) override { note("lost " + name); }
   void on_taken(std::uint32_t from, const proto::Taken& taken) override {
     note("taken " + std::to_string(taken.message));
     static_cast<void>(outbound_.on_taken(from, taken));

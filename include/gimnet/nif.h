@@ -401,8 +401,9 @@ typedef enum nif_incoming_type {
   /** Something that a watch of this node is about [watched; text and reason: why the hub ended it,
    * if NIF_WATCH_ENDED]. */
   NIF_WATCHED = 10,
-  /** A node of another hub has the better claim to the own name; the node goes on without one. Or
-   * the text is the full name of an own service: that has ended [text: name, from: who has it]. */
+  /** A node of another hub has the better claim to the own name; NIF_SESSION_REPLACED follows. Or
+   * the text is the full name of an own service: that alone has ended [text: name, from: who has
+   * it]. */
   NIF_NAME_LOST = 12
 } nif_incoming_type;
 

@@ -219,13 +219,17 @@ class Node(Waitable):
                          age_ms_max=to_ms(age_max) if age_max else 0)
         return Publisher(self, self._opened(_c.lib.gimi_advertise, to_text(name), options))
 
-    def subscribe(self, full_name: str, *, rate_hz: float = 0.0, newest_only: bool = False, queue: int = 0,
-                  silence: float = 0.0, window: int = 0, depth: int = 0, timeout: float = 5.0) -> Source:
+    def subscribe(self, full_name: str, *, rate_hz: Optional[float] = None, newest_only: bool = False,
+                  queue: Optional[int] = None, silence: Optional[float] = None, window: int = 0, depth: int = 0,
+                  timeout: float = 5.0) -> Source:
         """Subscribes to a service, which need not exist yet; each call has a queue of its own. `rate_hz`: the
         newest at each due time. `newest_only`: only the newest waits. `queue`: messages that may wait; the
         oldest is overwritten. `silence`: receive() raises Silence once in that time while nothing comes.
         `window`, `depth`: for experts. BadName, NotFound (it takes commands)."""
-        options = sized(_c.gimi_subscribe_options, rate_hz=rate_hz, queue=queue, timeout_ms=to_ms(timeout),
+        for option, value in (("rate_hz", rate_hz), ("queue", queue), ("silence", silence)):
+            if value is not None and value == 0:  # the C functions take 0 for a wish that nobody has
+                raise errors.BadArgument(f"{option} is 0: use more than 0, or leave it out")
+        options = sized(_c.gimi_subscribe_options, rate_hz=rate_hz or 0.0, queue=queue or 0, timeout_ms=to_ms(timeout),
                          newest_only=newest_only, silence_ms=to_ms(silence) if silence else 0, window=window,
                          depth=depth)
         return Source(self, self._opened(_c.lib.gimi_subscribe, to_text(full_name), options))

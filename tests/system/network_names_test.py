@@ -166,5 +166,20 @@ class Moves(Case):
         self.assertEqual((receiver.wait(), receiver.out), (0, b"one\ntwo\n"), receiver.err)
 
 
+class Losers(Case):
+    def test_a_program_ends_if_its_name_went_to_another_hubs_node(self):
+        first, second = self.hub("--accept-links", *PATIENT, hub_id=1), self.hub(*PATIENT, hub_id=2)
+        keeps, loses = (start_gimnet(self, hub, "recv", "--name", "robot", "-n", "1") for hub in (first, second))
+        for hub in (first, second):
+            hub.wait_for_node("robot")
+        added = run_gimnet(f"unix:{second.socket_path}", "ctl", "link", "add", first.url)
+        self.assertEqual(added.code, 0, added.err)
+        self.assertEqual(loses.wait(), 3)
+        self.assertIn("has the name and the better claim to it", loses.err)
+        self.assertIn("connect under another name", loses.err)
+        sent = run_gimnet(second, "send", "robot", data=b"one\n")
+        self.assertEqual((sent.code, keeps.wait()), (0, 0), sent.err + keeps.err)
+
+
 if __name__ == "__main__":
     unittest.main()

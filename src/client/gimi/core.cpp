@@ -230,9 +230,6 @@ nif_verdict Core::dispatch(const nif_incoming& in) {
     case NIF_OWN_SERVICE_MOVED:
       return verdict_of(services_.on_own_service_moved(
           in.text, {in.former_group, in.group, ServiceTable::refusal_of(in)}));
-    case NIF_NAME_LOST:
-      on_renamed();
-      return NIF_DONE;
     case NIF_WATCHED:
       return watches_.on_watched(in) ? NIF_DONE : NIF_NOT_NOW;
     default:

@@ -84,8 +84,10 @@ Outcome<void> reach(Core& core, const std::string& service, std::int64_t deadlin
     if (!stream && !stream.is(Status::not_found)) return stream.failure();
     if (stream && requests.knows(service)) break;
     const std::string node = service.substr(0, service.rfind('/'));
-    if (is_over(give_up_ns) || (!stream && !may_come(core.node(), node, left())))
-      return Failure{Status::not_found, "cannot ask " + service + ": nobody answers there"};
+    if (is_over(give_up_ns) || (!stream && !may_come(core.node(), node, left()))) {
+      return Failure{Status::not_found,
+                     "cannot ask " + service + ": nobody answers there at the moment"};
+    }
     requests.wait_for_place(service,
                             std::min(give_up_ns, steady_now_ns() + OpenRequests::kRetryNs));
   }

@@ -38,7 +38,7 @@ Outcome<ServiceRecord> listed_service(Core& core, const std::string& name, Timeo
                                          "': a text names a service, as in robot/drive; find() "
                                          "gives the node of a name"};
   }
-  const auto found = list_services(core.node(), name, timeout);
+  const auto found = list_services(core.node(), name, timeout, "find the service '" + name + "'");
   if (!found) return found.failure();
   // The listing takes patterns, too: only the service of that very name counts.
   const auto service = std::ranges::find(*found, name, &ServiceRecord::name);

@@ -91,11 +91,11 @@ Outcome<std::vector<NodeRecord>> list_nodes(nif_node* node, const std::string& p
 }
 
 Outcome<std::vector<ServiceRecord>> list_services(nif_node* node, const std::string& pattern,
-                                                  Timeout timeout) {
+                                                  Timeout timeout, const std::string& doing) {
   nif_service_list* list = nullptr;
   const char* wanted = pattern.empty() ? nullptr : pattern.c_str();
   const nif_status status = nif_list_services(node, wanted, &list, nif_timeout(timeout));
-  if (status != NIF_OK) return failure_of(status, "list the services");
+  if (status != NIF_OK) return failure_of(status, doing);
   const std::unique_ptr<nif_service_list, void (*)(nif_service_list*)> owner(list,
                                                                              &nif_free_services);
   std::vector<ServiceRecord> records;

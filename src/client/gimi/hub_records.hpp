@@ -18,9 +18,10 @@ namespace gimnet::gimi {
 [[nodiscard]] Outcome<std::vector<NodeRecord>> list_nodes(nif_node* node,
                                                           const std::string& pattern,
                                                           Timeout timeout);
-[[nodiscard]] Outcome<std::vector<ServiceRecord>> list_services(nif_node* node,
-                                                                const std::string& pattern,
-                                                                Timeout timeout);
+/// `doing`: for the sentence of a failure.
+[[nodiscard]] Outcome<std::vector<ServiceRecord>> list_services(
+    nif_node* node, const std::string& pattern, Timeout timeout,
+    const std::string& doing = "list the services");
 
 /// A node of that name may be there soon, if it is not: its connection broke, its hub cannot be
 /// reached, or names of other hubs may be on their way. Also where the hub did not say.

@@ -24,7 +24,7 @@ struct Loss {
 /// tell it.
 [[nodiscard]] inline std::string report_words(std::string_view reason) {
   using Meaning = std::pair<std::string_view, std::string_view>;
-  constexpr std::array<Meaning, 9> kMeanings{
+  constexpr std::array<Meaning, 13> kMeanings{
       Meaning{"no_such_node", "no node has that id"},
       Meaning{"no_such_group", "that service was withdrawn"},
       Meaning{"no_route", "no hub of that id can be reached"},
@@ -34,6 +34,10 @@ struct Loss {
       Meaning{"timed_out", "it took nothing for as long as the hub waits"},
       Meaning{"cut_message", "an earlier part of it was dropped"},
       Meaning{"renumbered", "that node has another id now: ask for it by its name"},
+      Meaning{"link_lost", "a link between hubs broke on the way, and it did not arrive"},
+      Meaning{"link_unsure", "a link between hubs broke on the way, and it may have arrived"},
+      Meaning{"hop_limit", "the ways between hubs were changing; try again"},
+      Meaning{"not_allowed", "a hub on the way does not allow it"},
   };
   std::string words = "the hub reports " + std::string(reason);
   for (const auto& [name, meaning] : kMeanings) {

@@ -356,11 +356,12 @@ Inbound::Verdict Inbound::take_watch_events(std::span<const std::byte> payload) 
 Inbound::Verdict Inbound::take_name_lost(std::span<const std::byte> payload) {
   const auto event = proto::decode<proto::ns::NameLost>(payload);
   if (!event) return malformed(event.error().sentence);
-  host_.on_name_lost(event->name);
   Record* record = make_event(NIF_NAME_LOST, event->name);
   record->incoming.from = event->holder.value();
   add_record(record, event->name.size());
-  return Verdict::going;
+  if (event->name.find('/') != std::string::npos) return Verdict::going;  // an own service
+  goodbye_ = {proto::GoodbyeCode::replaced, event->sentence};
+  return Verdict::goodbye;
 }
 
 Inbound::Verdict Inbound::take_report(const proto::FrameView& view) {

@@ -36,8 +36,6 @@ class InboundHost {
   [[nodiscard]] virtual bool on_service_moved(const proto::ns::ServiceMoved& event) = 0;
   /// True: the program is to have it.
   [[nodiscard]] virtual bool on_watch_events(const proto::ns::WatchEvents& events) = 0;
-  /// A node of another hub has the own name, or the full name of an own service.
-  virtual void on_name_lost(const std::string& name) = 0;
   virtual void on_taken(std::uint32_t from, const proto::Taken& taken) = 0;
   /// True: the program did not ask for this report.
   virtual bool on_report(const proto::Report& report) = 0;

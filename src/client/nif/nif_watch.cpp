@@ -26,7 +26,6 @@ nif_status nif_register(nif_node* node, const char* name, int32_t timeout_ms) {
         status != NIF_OK)
       return status;
     ns::RegisterNameAnswer answer;
-    found.begin_naming();
     const nif_status status = ask(found, ns::RegisterName{name}, answer, "take the name", name,
                                   deadline_after(timeout_ms));
     if (status != NIF_OK) return status;

@@ -218,31 +218,12 @@ bool Node::on_watch_events(const proto::ns::WatchEvents& events) {
   return watches_.on_events(events);
 }
 
-void Node::on_name_lost(const std::string& name) {
-  take_new_name();  // with its token
-  {
-    const MutexLock lock(mutex_);
-    // The full name of an own service begins with the own name.
-    const std::string own{info_.name};
-    if (!own.empty() && name.starts_with(own + '/')) return;
-    lost_name_ = name;
-  }
-  set_name("", session_.token);
-  take_new_name();
-}
-
-void Node::begin_naming() {
-  const MutexLock lock(mutex_);
-  lost_name_.clear();
-}
-
 void Node::set_name(const std::string& name, std::vector<std::byte> token) {
   {
     const MutexLock lock(mutex_);
-    const std::string& now = name == lost_name_ ? std::string() : name;
-    copy_text(info_.name, sizeof info_.name, now);
+    copy_text(info_.name, sizeof info_.name, name);
     info_.token_kept = 0;
-    new_name_ = NewName{now, std::move(token)};
+    new_name_ = NewName{name, std::move(token)};
   }
   wake_.raise();
 }

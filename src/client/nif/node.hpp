@@ -52,11 +52,8 @@ class Node final : private InboundHost {
   [[nodiscard]] CreditBook& credits() { return credits_; }
   [[nodiscard]] HubClock& clock() { return clock_; }
   /// The hub registered this node under another name, "" for none. The library's thread declares
-  /// the services anew. Not if the hub has taken that name back since begin_naming(), of which the
-  /// library's thread may hear first.
+  /// the services anew.
   void set_name(const std::string& name, std::vector<std::byte> token) GIMNET_EXCLUDES(mutex_);
-  /// Before the hub is asked for a name.
-  void begin_naming() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] const Options& options() const { return options_; }
 
   [[nodiscard]] std::uint32_t id() const {
@@ -100,7 +97,6 @@ class Node final : private InboundHost {
                                             const proto::ControlView& answer) override;
   bool on_service_moved(const proto::ns::ServiceMoved& event) override;
   [[nodiscard]] bool on_watch_events(const proto::ns::WatchEvents& events) override;
-  void on_name_lost(const std::string& name) override;
   void on_taken(std::uint32_t from, const proto::Taken& taken) override;
   bool on_report(const proto::Report& report) override;
   [[nodiscard]] std::optional<ReportedMessages::Start> message_of(
@@ -185,8 +181,7 @@ class Node final : private InboundHost {
     std::vector<std::byte> token;
   };
   std::optional<NewName> new_name_
-      GIMNET_GUARDED_BY(mutex_);                     ///< given while connected, not seen to yet
-  std::string lost_name_ GIMNET_GUARDED_BY(mutex_);  ///< since begin_naming()
+      GIMNET_GUARDED_BY(mutex_);  ///< given while connected, not seen to yet
   Inbound::Counts inbound_counts_ GIMNET_GUARDED_BY(mutex_);
   std::uint64_t bytes_received_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::uint64_t read_calls_ GIMNET_GUARDED_BY(mutex_) = 0;

@@ -47,6 +47,7 @@ ExitCode run_request(ToolSession& session) {
   const BytesView data = options.file.empty() ? BytesView(options.text) : BytesView(file->bytes());
   const Timeout timeout{static_cast<std::int64_t>(options.timeout_s * 1000)};
   const Reply reply = session.node().request(options.target, data, timeout, {.lane = options.lane});
+  if (reply.is(Status::not_found)) return session.fail_unknown_service(reply.failure().sentence);
   if (!reply) return session.fail(reply.failure());
   session.output().write(line_of(reply, options));
   return session.finish();

@@ -222,6 +222,13 @@ ExitCode ToolSession::fail_unmatched(const std::string& kind) {
   return fail({Status::not_found, sentence + (wider.empty() ? nearest_name(kind, target) : wider)});
 }
 
+ExitCode ToolSession::fail_unknown_service(const std::string& sentence) {
+  output_.flush();
+  const std::string& target = options_.target;
+  const bool known = is_service(target);  // it is there, and answers no requests
+  return fail({Status::not_found, known ? sentence : sentence + nearest_name("service", target)});
+}
+
 ExitCode ToolSession::fail(const Failure& failure) {
   if (stopped()) return exit_code_of_signal(stop_.signal());
   const bool lost = failure.status == Status::not_connected || failure.status == Status::refused;

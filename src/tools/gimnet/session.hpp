@@ -92,6 +92,8 @@ class ToolSession {
 
   /// No node or service (`kind`) matches the target: says so, with the nearest name.
   [[nodiscard]] ExitCode fail_unmatched(const std::string& kind);
+  /// The target is no service that does what was asked: says so, with the nearest name.
+  [[nodiscard]] ExitCode fail_unknown_service(const std::string& sentence);
 
   /// Prints why something did not work, and gives the code to end with: the signal's, if there was
   /// one.

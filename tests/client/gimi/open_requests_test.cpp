@@ -94,7 +94,7 @@ TEST_F(OpenRequestsTest, WhoAsksForDataIsToldToSubscribe) {
   EXPECT_EQ(asker_.request("calc/odom", "", kWait).failure().sentence,
             "cannot ask calc/odom: it gives data and answers nothing; subscribe to it");
   EXPECT_EQ(asker_.request("calc/nothing", "", kWait).failure().sentence,
-            "cannot ask calc/nothing: nobody answers there");
+            "cannot ask calc/nothing: nobody answers there at the moment");
 }
 
 TEST_F(OpenRequestsTest, NobodyAnswersThere) {

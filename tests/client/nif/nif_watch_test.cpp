@@ -58,8 +58,13 @@ TEST(NifWatch, TakesANameAndLosesItToANodeOfAnotherHub) {
         EXPECT_STREQ(in.text, "forklift");
         EXPECT_EQ(in.from, kPeerId);
         nif_release(&in);
+        ASSERT_EQ(nif_receive(node, &in, NIF_FOREVER), NIF_OK);
+        EXPECT_EQ(in.type, static_cast<std::uint32_t>(NIF_SESSION_REPLACED));
+        EXPECT_NE(std::string_view(in.text).find("late"), std::string_view::npos) << in.text;
+        nif_release(&in);
         EXPECT_EQ(nif_get_info(node, &info), NIF_OK);
-        EXPECT_STREQ(info.name, "") << "it goes on without";
+        EXPECT_TRUE(info.ended != 0 && info.replaced != 0);
+        EXPECT_EQ(nif_flush(node), NIF_REPLACED);
       },
       [&] {
         std::uint16_t number = 0;

@@ -61,6 +61,12 @@ Result<ns::ResolveAnswer, proto::Refusal> resolve(const HandlerContext& context,
     return ns::ResolveAnswer{make_id(context.facts.id, *index),
                              connected ? ns::NameStanding::held : ns::NameStanding::away, learning};
   }
+  if (name.find('/') != std::string_view::npos) {
+    return proto::Refusal{Status::not_found,
+                          "no node has the name '" + escaped(name, kQuotedMax) +
+                              "': a name with '/' is that of a service",
+                          learning};
+  }
   return proto::Refusal{Status::not_found,
                         "no node has the name '" + escaped(name, kQuotedMax) +
                             "'; `gimnet nodes` shows those that are there" +

@@ -38,7 +38,6 @@ class RecordingHost final : public InboundHost {
     return moved_is_news;
   }
   [[nodiscard]] bool on_watch_events(const proto::ns::WatchEvents&) override { return true; }
-  void on_name_lost(const std::string& name) override { lost_name = name; }
   void on_taken(std::uint32_t, const proto::Taken& taken) override {
     taken_received.push_back(taken);
   }
@@ -85,7 +84,6 @@ class RecordingHost final : public InboundHost {
   std::uint32_t counted_group = 0;     ///< its messages count in a window
   std::uint32_t unwanted_group = 0;    ///< its messages may not wait ...
   std::size_t unwanted_bytes_max = 0;  ///< ... if they have more bytes
-  std::string lost_name;
   std::optional<ReportedMessages::Start> start;  ///< of the message that reports are about
   std::vector<proto::Taken> taken_sent;
   std::vector<proto::Taken> taken_received;
