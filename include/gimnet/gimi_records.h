@@ -50,8 +50,11 @@ typedef struct gimi_service_record {
   gimi_delivery delivery;
   uint32_t subscribers;
   uint32_t window; /**< Of GIMI_SYNC. */
-  uint8_t retain;  /**< 1: a new subscriber gets the last message first. */
-  uint8_t reserved[7];
+  uint64_t missed; /**< Messages that subscribers at the asked hub missed, as they say. A watch does
+                      not tell it. */
+  gimi_peer missed_most; /**< The one of them that missed most; 0: nobody did. */
+  uint8_t retain;        /**< 1: a new subscriber gets the last message first. */
+  uint8_t reserved[3];
 } gimi_service_record;
 
 typedef struct gimi_hub_record {
@@ -88,6 +91,7 @@ typedef struct gimi_connection_record {
   uint64_t delivered;      /**< Frames handed to its connection; with resume, confirmed by it. */
   uint64_t sent_bytes;     /**< That the hub wrote to it. */
   uint64_t dropped;        /**< Frames that were for it. */
+  uint64_t missed;         /**< Messages that its subscriptions missed, as it says. */
   uint8_t connected;
   uint8_t reserved[7];
 } gimi_connection_record;

@@ -115,6 +115,9 @@ typedef struct nif_service_record {
   const char* hub_name;
   uint32_t window; /**< n of NIF_SYNC_DELIVERY. */
   uint8_t retain;
+  uint64_t missed;      /**< Messages that subscribers at the asked hub missed, as they say. A watch
+                           does not tell it. */
+  uint32_t missed_most; /**< The node id of the one that missed most; 0: nobody did. */
 } nif_service_record;
 
 typedef struct nif_service_list {

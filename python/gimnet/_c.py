@@ -136,7 +136,8 @@ class gimi_node_record(ctypes.Structure):
 class gimi_service_record(ctypes.Structure):
     _fields_ = [("name", c_char_p), ("hub_name", c_char_p), ("metadata", c_char_p), ("node", c_uint32),
                 ("group_id", c_uint32), ("key", gimi_key), ("direction", c_int32), ("delivery", c_int32),
-                ("subscribers", c_uint32), ("window", c_uint32), ("retain", c_uint8), ("reserved", c_uint8 * 7)]
+                ("subscribers", c_uint32), ("window", c_uint32), ("missed", c_uint64), ("missed_most", c_uint32),
+                ("retain", c_uint8), ("reserved", c_uint8 * 3)]
 
 
 class gimi_watch_event(ctypes.Structure):

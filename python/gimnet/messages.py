@@ -200,7 +200,8 @@ _DELIVERY_NAMES = {number: name for name, number in DELIVERIES.items()}
 
 @dataclass(frozen=True)
 class ServiceRecord:
-    """A service of the network. `accepts`: others send to it, instead of subscribing."""
+    """A service of the network. `accepts`: others send to it, instead of subscribing. `missed`: messages that
+    subscribers at the asked hub missed; `missed_most`: the one of them that missed most."""
 
     name: str
     hub_name: str
@@ -212,6 +213,8 @@ class ServiceRecord:
     window: int
     subscribers: int
     retain: bool
+    missed: int
+    missed_most: Optional[Peer]
 
     @classmethod
     def of(cls, raw: Any) -> ServiceRecord:
@@ -219,7 +222,7 @@ class ServiceRecord:
         delivery = _DELIVERY_NAMES.get(raw.delivery, f"unknown {raw.delivery}")
         return cls(raw.name.decode(), raw.hub_name.decode(), raw.metadata.decode(), Peer(raw.node),
                    (raw.key.type, raw.key.instance), raw.direction == _c.GIMI_ACCEPTS, delivery, raw.window,
-                   raw.subscribers, bool(raw.retain))
+                   raw.subscribers, bool(raw.retain), raw.missed, Peer(raw.missed_most) if raw.missed_most else None)
 
 
 @dataclass(frozen=True)

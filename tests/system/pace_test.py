@@ -2,6 +2,7 @@
 """Windows of subscriptions that must not leak, and the last message for who comes late. Judged by counts and sequence numbers,
 not by time."""
 
+import json
 import os
 import pathlib
 import struct
@@ -42,6 +43,30 @@ class Latest(unittest.TestCase):
                 self.assertEqual(shown, sorted(set(shown)))
                 echo.signal(2)
                 self.assertEqual(echo.wait(), 130, echo.err)
+
+
+    def test_the_hub_shows_who_misses_how_many(self):
+        hub = Hub(self)
+        reading, writing = os.pipe()
+        start_gimnet(self, hub, "echo", "camera/pose", "--raw", stdout=writing)
+        os.close(writing)
+        pub = start_gimnet(self, hub, "pub", "camera/pose", "--delivery", "latest", "--wait", "1", "--rate", "1000",
+                           stdin=subprocess.PIPE)
+        pub.popen.stdin.write(b"".join(b"%04096d\n" % number for number in range(self.LINES)))
+        pub.popen.stdin.flush()
+        with open(reading, "rb") as output:
+            shown = [int(output.readline())]
+            while shown[-1] != self.LINES - 1:
+                shown.append(int(output.readline()))
+            missed = self.LINES - shown[0] - len(shown)
+            self.assertGreater(missed, 0)
+
+            def service():
+                return json.loads(run_gimnet(hub, "services", "camera/pose", "--json").out)[0]
+            wait_until(lambda: service()["missed"] == missed, "the hub to know all")
+        slow = [(each["id"], each["missed"]) for each in hub.status()["connections"] if each["missed"]]
+        self.assertEqual(slow, [(service()["missed_most"], missed)])
+        self.assertIn(f"{missed} (most: {slow[0][0]})", run_gimnet(hub, "services").out.decode())
 
 
 class Windows(unittest.TestCase):

@@ -140,7 +140,9 @@ using SharedHandle = std::shared_ptr<const Handle>;
           found.metadata,
           found.hub_name,
           found.window,
-          found.retain != 0};
+          found.retain != 0,
+          found.missed,
+          Peer{found.missed_most}};
 }
 
 [[nodiscard]] inline HubRecord record_of(const gimi_hub_record& found) {
@@ -151,7 +153,8 @@ using SharedHandle = std::shared_ptr<const Handle>;
 [[nodiscard]] inline ConnectionRecord record_of(const gimi_connection_record& found) {
   return {Peer{found.node},     found.name,           found.shard,        found.transport,
           found.peer,           found.connected != 0, found.queued_bytes, found.accepted,
-          found.received_bytes, found.delivered,      found.sent_bytes,   found.dropped};
+          found.received_bytes, found.delivered,      found.sent_bytes,   found.dropped,
+          found.missed};
 }
 
 [[nodiscard]] inline NetworkHub record_of(const gimi_network_hub_record& found) {

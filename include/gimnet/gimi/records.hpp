@@ -46,6 +46,9 @@ struct ServiceRecord {
   std::string hub_name;
   std::uint32_t window = 0;  ///< of delivery sync
   bool retain = false;       ///< a new subscriber gets the last message first
+  /// Messages that subscribers at the asked hub missed, as they say. A watch does not tell it.
+  std::uint64_t missed = 0;
+  Peer missed_most;  ///< the one of them that missed most; 0: nobody did
 
   /// It answers requests.
   [[nodiscard]] bool answers() const {
@@ -187,6 +190,7 @@ struct ConnectionRecord {
       0;  ///< frames handed to its connection; where resume is on, confirmed by it
   std::uint64_t sent_bytes = 0;  ///< that the hub wrote to it
   std::uint64_t dropped = 0;     ///< frames that were for it
+  std::uint64_t missed = 0;      ///< messages that its subscriptions missed, as it says
 };
 
 }  // namespace gimnet::inline v0_9

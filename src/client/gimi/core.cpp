@@ -34,7 +34,8 @@ std::size_t nif_bytes_max(std::size_t message_bytes_max) {
 Core::Core(const NodeOptions& options)
     : inbox_(
           options.queue_messages, options.receive_bytes, [this] { uplink_.deliver(); },
-          [this](const TakenMessages& taken, bool more) { uplink_.credit(taken, more); }),
+          [this](const TakenMessages& taken, bool more) { uplink_.credit(taken, more); },
+          {[this] { attend(); }, [this] { services_.tell_missed(); }}),
       streams_(uplink_, [this](bool at_once) { clerk_.attend(at_once); }),
       services_(uplink_, inbox_,
                 [this](const std::string& name, const ServicePlace& place) {

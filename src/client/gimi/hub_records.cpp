@@ -74,7 +74,9 @@ ServiceRecord record_of(const nif_service_record& found) {
           found.metadata,
           found.hub_name,
           found.window,
-          found.retain != 0};
+          found.retain != 0,
+          found.missed,
+          Peer{found.missed_most}};
 }
 
 Outcome<std::vector<NodeRecord>> list_nodes(nif_node* node, const std::string& pattern,
@@ -156,8 +158,8 @@ Outcome<std::vector<ConnectionRecord>> ask_connections(Asking who, Timeout timeo
       const proto::ctrl::ConnectionCounts& counts = found.counts;
       records.push_back({Peer{found.node.value()}, found.name, found.shard, found.transport,
                          found.peer, found.connected, counts.queued_bytes, counts.accepted,
-                         counts.received_bytes, counts.delivered, counts.sent_bytes,
-                         counts.dropped});
+                         counts.received_bytes, counts.delivered, counts.sent_bytes, counts.dropped,
+                         counts.missed});
     }
     if (!page->more || page->connections.empty()) return records;
   }

@@ -182,14 +182,33 @@ bool Inbox::visit(MessageQueue& queue, const SourceVisitor& visitor) {
 }
 
 bool Inbox::tick() {
-  const MutexLock lock(mutex_);
+  bool more = false;
+  bool tells = false;
+  {
+    const MutexLock lock(mutex_);
+    more = look_at_silence() && !end_;
+    // relaxed: see note_missed()
+    if (missed_.load(std::memory_order_relaxed)) {
+      tells = is_over(missed_due_ns_);
+      more = more || (!tells && !end_);
+    }
+    if (tells) {
+      missed_due_ns_ = deadline_after(kMissedPeriod);
+      missed_.store(false, std::memory_order_relaxed);  // see note_missed()
+    }
+  }
+  if (tells) missing_.tell();
+  return more;
+}
+
+bool Inbox::look_at_silence() {
   bool more = false;
   for (MessageQueue& queue : queues_) {
     if (queue.silent_at_ns() == INT64_MAX || !queue.source().is_member()) continue;
     more = true;
     if (is_over(queue.silent_at_ns())) queue.source().update(true);
   }
-  return more && !end_;
+  return more;
 }
 
 void Inbox::visit_any(const SourceVisitor& visitor) {

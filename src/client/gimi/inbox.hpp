@@ -37,17 +37,26 @@ class Inbox {
   /// Bytes that wait in their queues together, as many as the largest message has by default: a
   /// program that never looks there does not grow, whatever strangers send it.
   static constexpr std::size_t kUnaskedBytesMax = std::size_t{64} << 20;
+  /// The hub takes what a subscription missed once in that time.
+  static constexpr Timeout kMissedPeriod{1000};
 
   /// Called without a lock. `more`: others wait in the same queue.
   using OnTaken = std::function<void(const TakenMessages& taken, bool more)>;
+  /// Messages were missed: `begin` is called once, maybe with locks, as tick() has to be called;
+  /// then `tell` without a lock, from tick(), at most once a second.
+  struct Missing {
+    std::function<void()> begin;
+    std::function<void()> tell;
+  };
   /// `on_room` is called without a lock when a queue that refused has room again; `on_taken` with
   /// what went out of a queue and counts in a window.
   Inbox(std::size_t unasked_messages, std::size_t bytes_max, std::function<void()> on_room,
-        OnTaken on_taken = {})
+        OnTaken on_taken = {}, Missing missing = {})
       : unasked_messages_(unasked_messages),
         bytes_max_(bytes_max),
         on_room_(std::move(on_room)),
-        on_taken_(std::move(on_taken)) {}
+        on_taken_(std::move(on_taken)),
+        missing_(std::move(missing)) {}
 
   /// The queue of a key, made if there is none; with `options` changed to them.
   MessageQueue& queue(MessageKey key, const QueueOptions* options) GIMNET_EXCLUDES(mutex_);
@@ -73,7 +82,13 @@ class Inbox {
   [[nodiscard]] bool visit(MessageQueue& queue, const SourceVisitor& visitor)
       GIMNET_EXCLUDES(mutex_);
   void visit_any(const SourceVisitor& visitor) GIMNET_EXCLUDES(mutex_);
-  /// Tells wait sets of queues that are silent. False: none of a set expects messages.
+  /// A subscription missed messages, or one of its queues was full.
+  void note_missed() {
+    // relaxed: the counts are read under their own locks
+    if (missing_.begin && !missed_.exchange(true, std::memory_order_relaxed)) missing_.begin();
+  }
+  /// Tells wait sets of queues that are silent, and what was missed. False: nothing is left to tell
+  /// at a later time.
   [[nodiscard]] bool tick() GIMNET_EXCLUDES(mutex_);
   void count_dropped() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::uint64_t dropped() GIMNET_EXCLUDES(mutex_);
@@ -110,6 +125,8 @@ class Inbox {
     if (queue.counted == queue.empty()) count(queue, !queue.empty());
   }
   void count(MessageQueue& queue, bool filled) GIMNET_REQUIRES(mutex_);
+  /// True: a queue of a wait set expects messages.
+  [[nodiscard]] bool look_at_silence() GIMNET_REQUIRES(mutex_);
   /// Makes room for another key. REQUIRES: there are kUnaskedKeysMax.
   void forget_unasked() GIMNET_REQUIRES(mutex_);
   /// Overwrites the oldest messages beyond kUnaskedBytesMax; the newest one stays.
@@ -128,6 +145,8 @@ class Inbox {
   const std::size_t bytes_max_;
   const std::function<void()> on_room_;
   const OnTaken on_taken_;
+  const Missing missing_;
+  std::atomic<bool> missed_{false};  ///< and not told yet
 
   Mutex mutex_;
   Condition any_;
@@ -143,6 +162,7 @@ class Inbox {
       nullptr;  ///< at most one: nothing comes while one refuses
   std::uint64_t arrivals_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::uint64_t dropped_ GIMNET_GUARDED_BY(mutex_) = 0;
+  std::int64_t missed_due_ns_ GIMNET_GUARDED_BY(mutex_) = 0;  ///< may be told then; steady
   Ending end_ GIMNET_GUARDED_BY(mutex_);
 };
 

@@ -5,6 +5,7 @@
 
 #include "base/check.hpp"
 #include "client/gimi/ending.hpp"
+#include "client/gimi/inbox.hpp"
 #include "client/gimi/message.hpp"
 
 namespace gimnet::gimi {
@@ -79,6 +80,7 @@ std::size_t MessageQueue::overwrite_oldest() {
   count_taken(entries_.front().message);
   entries_.pop_front();
   ++overwritten_;
+  inbox_.note_missed();
   return bytes;
 }
 

@@ -34,6 +34,8 @@ gimi_service_record record_of(const ServiceRecord& of) {
   record.delivery = static_cast<gimi_delivery>(of.delivery);
   record.subscribers = of.subscribers;
   record.window = of.window;
+  record.missed = of.missed;
+  record.missed_most = of.missed_most.id;
   record.retain = of.retain ? 1 : 0;
   return record;
 }
@@ -56,6 +58,7 @@ gimi_connection_record record_of(const ConnectionRecord& of) {
   record.delivered = of.delivered;
   record.sent_bytes = of.sent_bytes;
   record.dropped = of.dropped;
+  record.missed = of.missed;
   record.connected = of.connected ? 1 : 0;
   return record;
 }

@@ -367,6 +367,18 @@ ServiceTable::Place ServiceTable::on_own_service_moved(const std::string& name,
 void ServiceTable::on_reconnected() {
   const MutexLock lock(mutex_);
   for (auto& [name, service] : published_by_name_) service->on_reconnected();
+  // The hub may have begun anew.
+  for (auto& [name, service] : subscribed_) service->missed_told = 0;
+  if (!subscribed_.empty()) inbox_.note_missed();
+}
+
+void ServiceTable::tell_missed() {
+  const MutexLock lock(mutex_);
+  for (auto& [name, service] : subscribed_) {
+    const std::uint64_t total = service->missed_in_all();
+    if (total == service->missed_told || service->place.group == 0) continue;
+    if (uplink_.tell_missed(service->place.group, total)) service->missed_told = total;
+  }
 }
 
 void ServiceTable::end(const Ending& ending) {

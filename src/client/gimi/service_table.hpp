@@ -97,6 +97,8 @@ class ServiceTable {
   [[nodiscard]] Place on_own_service_moved(const std::string& name, const OwnMove& move)
       GIMNET_EXCLUDES(mutex_);
   void on_reconnected() GIMNET_EXCLUDES(mutex_);
+  /// Tells the hub what subscriptions missed since it was told last.
+  void tell_missed() GIMNET_EXCLUDES(mutex_);
   void end(const Ending& ending) GIMNET_EXCLUDES(mutex_);
 
  private:

@@ -245,6 +245,16 @@ std::uint64_t SubscribedService::missed(const Subscriber& subscriber) {
   return missed_ - subscriber.missed_before;
 }
 
+std::uint64_t SubscribedService::missed_in_all() {
+  const MutexLock lock(mutex_);
+  std::uint64_t sum = 0;
+  for (const SharedSubscriber& each : subscribers_) {
+    sum += inbox_.counts(each->queue).overwritten;
+    if (each->wish.rate_hz == 0.0) sum += missed_ - each->missed_before;
+  }
+  return sum;
+}
+
 bool SubscribedService::exists() {
   const MutexLock lock(mutex_);
   return exists_;
@@ -343,6 +353,7 @@ void SubscribedService::count_missed(const Position& message) {
   // The first of a provider, or of an epoch, says where it stands.
   if (message.from == last_.from && message.epoch == last_.epoch && step > 0)
     missed_ += static_cast<std::uint32_t>(step - 1);
+  if (step > 1) inbox_.note_missed();
 }
 
 void SubscribedService::take(const Position& message) {

@@ -149,6 +149,10 @@ class SubscribedService {
   /// Messages that did not come for it, by their sequence.
   [[nodiscard]] std::uint64_t missed(const Subscriber& subscriber) GIMNET_EXCLUDES(mutex_);
 
+  /// All that its subscribers missed, as its hub is told: without those that did not come to a
+  /// subscriber that wants no more than a rate.
+  [[nodiscard]] std::uint64_t missed_in_all() GIMNET_EXCLUDES(mutex_);
+
   // ---- where it is
 
   /// There is a provider.
@@ -188,6 +192,8 @@ class SubscribedService {
   bool retained = false;
   /// A stream of this node leads there; guarded by the table's asking mutex.
   bool followed = false;
+  /// The hub knows of so many missed messages; guarded by the table's mutex.
+  std::uint64_t missed_told = 0;
   /// Its place now; guarded by the table's mutex.
   ServicePlace place;
   /// Group ids that lead to it, the youngest last; guarded by the table's mutex.

@@ -126,6 +126,17 @@ void Uplink::rouse() const {
   if (nif::Node* const direct = direct_.load()) direct->rouse();
 }
 
+bool Uplink::tell_missed(std::uint32_t group, std::uint64_t total) const {
+  nif::Node* const direct = direct_.load();
+  bool told = false;
+  if (direct == nullptr) return told;
+  static_cast<void>(nif::guarded([&]() -> nif_status {
+    told = direct->credits().tell_missed(GroupId{group}, total);
+    return NIF_OK;
+  }));
+  return told;
+}
+
 std::optional<nif::HubClock::OwnTime> Uplink::own_time(std::int64_t hub_ns) const {
   nif::Node* const direct = direct_.load();
   return direct == nullptr ? std::nullopt : direct->clock().own_time(hub_ns);

@@ -82,6 +82,8 @@ class Uplink {
   /// As Node::set_task() and Node::rouse().
   void set_task(std::function<net::Deadline()> task) const;
   void rouse() const;
+  /// As CreditBook::tell_missed().
+  [[nodiscard]] bool tell_missed(std::uint32_t group, std::uint64_t total) const;
 
   /// As HubClock::own_time().
   [[nodiscard]] std::optional<nif::HubClock::OwnTime> own_time(std::int64_t hub_ns) const;

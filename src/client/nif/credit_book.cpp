@@ -4,9 +4,10 @@
 
 namespace gimnet::nif {
 
-void CreditBook::begin(bool resumed) {
+void CreditBook::begin(const SessionTerms& session) {
   const MutexLock lock(mutex_);
-  if (resumed) return;
+  takes_missed_ = session.takes_missed;
+  if (session.resumed) return;
   for (auto& [group, account] : accounts_) restart(account);
 }
 
@@ -53,6 +54,11 @@ void CreditBook::take(std::uint32_t group, std::uint32_t epoch, std::uint32_t me
   account.taken += messages;
   const std::uint64_t enough = more ? std::max(1u, account.window / 2) : 1;
   if (account.taken - account.told >= enough) tell(group, account);
+}
+
+bool CreditBook::tell_missed(GroupId group, std::uint64_t total) {
+  const MutexLock lock(mutex_);
+  return takes_missed_ && outbound_.post(proto::flow::Missed{group, total});
 }
 
 void CreditBook::restart(Account& account) {

@@ -8,6 +8,7 @@
 #include "base/ids.hpp"
 #include "base/mutex.hpp"
 #include "client/nif/outbound.hpp"
+#include "client/nif/session_terms.hpp"
 
 namespace gimnet::nif {
 
@@ -15,15 +16,15 @@ namespace gimnet::nif {
 /// CREDITs: totals, which are repeated after every WELCOME, so that none is lost (docs/protocol.md,
 /// section 8). Both ends count from the answer to the SUBSCRIBE that began the subscription, or
 /// from the SERVICE_MOVED that gave it a new group, and anew from a WELCOME that was not `resumed`.
-/// Thread safety: take() from any thread, the rest from the library's. Limits: one account for each
-/// group that the hub counts.
+/// Thread safety: take() and tell_missed() from any thread, the rest from the library's. Limits:
+/// one account for each group that the hub counts.
 class CreditBook {
  public:
   explicit CreditBook(Outbound& outbound) : outbound_(outbound) {}
 
-  /// A connection is about to stand, before the first post on it. Unless it was `resumed` counts
+  /// A connection is about to stand, before the first post on it. Unless it was resumed counts
   /// begin at 0, and no total of the earlier connection is told on this one.
-  void begin(bool resumed) GIMNET_EXCLUDES(mutex_);
+  void begin(const SessionTerms& session) GIMNET_EXCLUDES(mutex_);
   /// A connection stands: what was taken is told (again).
   void tell_all() GIMNET_EXCLUDES(mutex_);
   /// The hub counts this group under that number, with that window; 0: it does not. Counts under
@@ -38,6 +39,9 @@ class CreditBook {
   /// at once.
   void take(std::uint32_t group, std::uint32_t epoch, std::uint32_t messages, bool more)
       GIMNET_EXCLUDES(mutex_);
+  /// The program missed so many messages of that group in all. False: there is no connection, or
+  /// its hub does not want to know.
+  bool tell_missed(GroupId group, std::uint64_t total) GIMNET_EXCLUDES(mutex_);
 
  private:
   struct Account {
@@ -59,6 +63,7 @@ class CreditBook {
 
   Mutex mutex_;
   std::uint32_t epochs_ GIMNET_GUARDED_BY(mutex_) = 0;
+  bool takes_missed_ GIMNET_GUARDED_BY(mutex_) = false;  ///< the hub
   std::map<std::uint32_t, Account> accounts_ GIMNET_GUARDED_BY(mutex_);
 };
 

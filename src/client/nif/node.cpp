@@ -106,7 +106,7 @@ bool Node::take_over(Admitted admitted, bool first) {
   session_ = std::move(admitted.session);
   if (!first) outbound_.begin_declaring();  // until declare_again() below knows better
   // Before anything can be posted: a total of the earlier connection would count as one of this.
-  credits_.begin(session_.resumed);
+  credits_.begin(session_);
   const auto let_go = outbound_.attach(*stream_, session_);
   if (!let_go) return false;
   id_.store(session_.id, std::memory_order_relaxed);  // a number by itself

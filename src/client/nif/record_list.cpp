@@ -45,6 +45,8 @@ nif_service_record view_of(const proto::ns::ServiceRecord& record) {
   view.metadata = record.metadata.c_str();
   view.window = record.window;
   view.retain = record.retain ? 1 : 0;
+  view.missed = record.missed;
+  view.missed_most = record.missed_most.value();
   view.hub_name = record.hub_name.c_str();
   return view;
 }

@@ -61,6 +61,7 @@ Result<SessionTerms, Failure> session_terms_of(const proto::Welcome& welcome, bo
   }
   session.hub_taken = session.resumed ? welcome.taken : 0;
   session.hub_resume_bytes = welcome.resume_buffer_bytes;
+  session.takes_missed = (welcome.features & proto::kFeatureMissed) != 0;
   if (!welcome.last_goodbye_sentence.empty()) {
     const auto code = static_cast<proto::GoodbyeCode>(welcome.last_goodbye_code);
     session.earlier_goodbye = proto::goodbye_name(code) + (": " + welcome.last_goodbye_sentence);

@@ -28,6 +28,7 @@ struct SessionTerms {
   bool resumed = false;          ///< the counts of the earlier connection go on
   std::uint64_t hub_taken = 0;   ///< data frames of this epoch that the hub took
   std::uint32_t hub_resume_bytes = 0;
+  bool takes_missed = false;  ///< the hub wants to know what subscriptions miss
   std::optional<std::uint32_t> retained_bytes_max;  ///< as Welcome::retained_bytes_max
   std::string earlier_goodbye;  ///< why the hub closed the session's last connection
 };

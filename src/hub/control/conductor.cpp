@@ -141,6 +141,7 @@ proto::Welcome Conductor::welcome(const Session& session, const proto::Hello& he
   welcome.hub = facts_.id;
   welcome.hub_name = facts_.name;
   welcome.frame_length_max = static_cast<std::uint32_t>(limits_.frame_bytes);
+  welcome.features = proto::kFeatureMissed;
   welcome.keep_alive_ms = static_cast<std::uint32_t>(limits_.keep_alive_ms);
   welcome.silent_ms = static_cast<std::uint32_t>(limits_.silent_ms);
   welcome.hub_time_ns = moment.wall_ns;
@@ -156,9 +157,7 @@ proto::Welcome Conductor::welcome(const Session& session, const proto::Hello& he
 }
 
 void Conductor::on_event(ShardEvent event, milliseconds now) {
-  const auto is_link = [this](NodeId node) {
-    return links_ != nullptr && index_of(node) == kHubIndex;
-  };
+  const auto is_link = [this](NodeId id) { return links_ != nullptr && index_of(id) == kHubIndex; };
   if (const auto* frame = std::get_if<ControlFrameEvent>(&event.what)) {
     is_link(frame->node) ? on_link_frame(*frame, now) : on_frame(*frame, now);
   } else if (const auto* detached = std::get_if<DetachedEvent>(&event.what)) {
@@ -169,6 +168,8 @@ void Conductor::on_event(ShardEvent event, milliseconds now) {
   } else if (const auto* missed = std::get_if<EventsMissedEvent>(&event.what)) {
     if (const Session* session = find(missed->session, missed->node))
       runner_.events_missed(*session, missed->attachment);
+  } else if (const auto* told = std::get_if<MissedEvent>(&event.what)) {
+    membership_.services().note_missed(node_index_of(told->node), told->missed);
   } else if (std::holds_alternative<DrainedEvent>(event.what) && shards_to_drain_ > 0) {
     --shards_to_drain_;
   }

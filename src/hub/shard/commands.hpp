@@ -16,6 +16,7 @@
 #include "hub/limits.hpp"
 #include "net/stream.hpp"
 #include "proto/control/link.hpp"
+#include "proto/frame/flow.hpp"
 
 // All that the conductor tells a shard, one type each, and all that a shard tells the conductor.
 // Nothing else crosses between the two threads, but for the tables that control publishes.
@@ -245,6 +246,13 @@ struct EventsMissedEvent {
   NodeId node;
 };
 
+/// The subscriptions of a node missed so many messages of that group, in total.
+struct MissedEvent {
+  SessionRef session;
+  NodeId node;
+  proto::flow::Missed missed;
+};
+
 /// A connection to which GOODBYE was written: what its peer still sends is thrown away for a
 /// moment, since closing with unread bytes would reset the connection and could take the GOODBYE
 /// with it.
@@ -257,7 +265,8 @@ struct DrainedEvent {};
 
 struct ShardEvent {
   ShardIndex shard;
-  std::variant<ControlFrameEvent, DetachedEvent, EventsMissedEvent, FarewellEvent, DrainedEvent>
+  std::variant<ControlFrameEvent, DetachedEvent, EventsMissedEvent, MissedEvent, FarewellEvent,
+               DrainedEvent>
       what;
 };
 

@@ -148,7 +148,8 @@ struct Connection : Recipient {
   std::uint32_t ping_sequence = 0;
   std::uint32_t unsent_limit = 0;            ///< of the transport; 0: not limited
   std::unique_ptr<net::Stream> transport;    ///< nullptr: away
-  TokenBucket oddities;                      ///< CREDITs of no use
+  TokenBucket oddities;                      ///< CREDITs of no use, and MISSEDs too many
+  TokenBucket missed;                        ///< MISSEDs
   std::uint64_t posted_shards = kAllShards;  ///< that its last read sent to; all, before the first
   GatherWriter writer;
   FrameTail tail;

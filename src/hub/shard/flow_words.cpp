@@ -1,5 +1,7 @@
 #include "hub/shard/flow_words.hpp"
 
+#include <algorithm>
+
 #include "base/clock.hpp"
 
 namespace gimnet::hub {
@@ -29,6 +31,14 @@ void note_taken(ShardState& state, Connection& connection, const proto::RunView&
   resume.taken += view.frames;
   resume.bytes_since_told += view.size;
   if (resume.bytes_since_told >= resume.peer_resume_bytes / 4) send_confirm(state, connection);
+}
+
+bool tell_missed(ShardState& state, Connection& connection, const proto::flow::Missed& missed) {
+  if (connection.is_link()) return true;
+  const std::uint64_t most = std::max<std::uint64_t>(1, state.limits.subscriptions_per_node);
+  if (!connection.missed.take({most, most}, std::chrono::milliseconds{state.now_ms})) return false;
+  state.tell_conductor({state.self, MissedEvent{connection.session(), connection.node, missed}});
+  return true;
 }
 
 }  // namespace gimnet::hub

@@ -29,4 +29,9 @@ inline void count_accepted(ShardState& state, Connection& connection, const prot
   if (connection.resume) note_taken(state, connection, view);
 }
 
+/// Tells the conductor what the subscriptions of a node missed. False: the node says it more often
+/// than once a second for each subscription that it may have.
+[[nodiscard]] bool tell_missed(ShardState& state, Connection& connection,
+                               const proto::flow::Missed& missed);
+
 }  // namespace gimnet::hub

@@ -51,6 +51,8 @@ bool HubFrames::take_flow(Connection& connection, const proto::RunView& view) {
   if (const auto* credit = std::get_if<proto::flow::Credit>(&*message)) {
     if (!state_.pacer.on_credit(connection, *credit)) return on_bad_credit(connection);
   }
+  if (const auto* missed = std::get_if<proto::flow::Missed>(&*message))
+    return tell_missed(state_, connection, *missed) || on_bad_credit(connection);
   return true;
 }
 
@@ -62,7 +64,7 @@ bool HubFrames::on_bad_credit(Connection& connection) {
   closer_.close(
       connection, proto::GoodbyeCode::oddities,
       "more than " + std::to_string(limits.oddities_burst) +
-          " CREDITs in a short time were for no subscription of this node, or out of order");
+          " CREDITs in a short time were of no use, or MISSEDs came more than once a second");
   return false;
 }
 

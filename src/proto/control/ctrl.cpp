@@ -133,6 +133,7 @@ void ConnectionsAnswer::write(bitestream::Writer& writer) const {
     writer.put_u64(10, record.counts.delivered);
     writer.put_u64(11, record.counts.sent_bytes);
     writer.put_u64(12, record.counts.dropped);
+    if (record.counts.missed != 0) writer.put_u64(13, record.counts.missed);
     writer.end_nested();
   }
   writer.put_bool(4, more);
@@ -154,6 +155,7 @@ ConnectionsAnswer ConnectionsAnswer::read(Fields& fields) {
     connection.counts.delivered = record.number<std::uint64_t>(10, "number of delivered frames", 0);
     connection.counts.sent_bytes = record.number<std::uint64_t>(11, "number of sent bytes", 0);
     connection.counts.dropped = record.number<std::uint64_t>(12, "number of dropped frames", 0);
+    connection.counts.missed = record.number<std::uint64_t>(13, "number of missed messages", 0);
     return connection;
   });
   answer.more = fields.flag(4, "more", false);

@@ -127,6 +127,7 @@ struct ConnectionCounts {
   std::uint64_t delivered = 0;  ///< frames to it
   std::uint64_t sent_bytes = 0;
   std::uint64_t dropped = 0;  ///< frames to it
+  std::uint64_t missed = 0;   ///< messages, as it says itself of its subscriptions
   friend bool operator==(const ConnectionCounts&, const ConnectionCounts&) = default;
 };
 

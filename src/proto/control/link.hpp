@@ -92,6 +92,9 @@ struct Hello {
 
 // WELCOME
 
+/// Features that a hub offers in WELCOME.
+inline constexpr std::uint64_t kFeatureMissed = 1;  ///< takes FLOW MISSED
+
 struct Welcome {
   static constexpr std::uint16_t kOperation = static_cast<std::uint16_t>(LinkOperation::welcome);
   static constexpr const char* kName = "WELCOME";

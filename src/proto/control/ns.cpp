@@ -248,6 +248,8 @@ void write_record(bitestream::Writer& writer, const ServiceRecord& record) {
   put_clean_text(writer, 10, record.hub_name, kNameBytesMax);
   if (record.window != 0) writer.put_u32(11, record.window);
   if (record.retain) writer.put_bool(12, record.retain);
+  if (record.missed != 0) writer.put_u64(13, record.missed);
+  if (record.missed_most != NodeId{}) writer.put_u32(14, record.missed_most.value());
 }
 ServiceRecord read_service_record(Fields& fields) {
   ServiceRecord service;
@@ -263,6 +265,8 @@ ServiceRecord read_service_record(Fields& fields) {
   service.hub_name = fields.text(10, "hub name", kNameBytesMax);
   service.window = fields.number<std::uint32_t>(11, "window", 0);
   service.retain = fields.flag(12, "retain", false);
+  service.missed = fields.number<std::uint64_t>(13, "number of missed messages", 0);
+  service.missed_most = read_id<NodeId>(fields, 14, "node id of the one that missed most");
   return service;
 }
 

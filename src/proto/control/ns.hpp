@@ -219,6 +219,8 @@ struct ServiceRecord {
   std::string hub_name;
   std::uint32_t window = 0;  ///< n of delivery sync(n)
   bool retain = false;
+  std::uint64_t missed = 0;  ///< by the subscribers at the hub that answers
+  NodeId missed_most;        ///< the one of them that missed most
   friend bool operator==(const ServiceRecord&, const ServiceRecord&) = default;
 };
 /// Bytes that the record takes in an answer, at most: an answer has to fit in a frame.

@@ -23,6 +23,7 @@ constexpr std::size_t size_of(FlowOperation operation) {
     case FlowOperation::confirm:
     case FlowOperation::skip:
     case FlowOperation::dropped:
+    case FlowOperation::missed:
       return kCountSize;
     case FlowOperation::pause:
     case FlowOperation::resume:
@@ -106,6 +107,12 @@ struct PayloadEncoder {
     store_le(bytes + 8, dropped.count);
     return kCountSize;
   }
+  std::size_t operator()(const Missed& missed) const {
+    store_operation(bytes, FlowOperation::missed, kCountSize);
+    store_le(bytes + 4, missed.group.value());
+    store_le(bytes + 8, missed.total);
+    return kCountSize;
+  }
 };
 
 }  // namespace
@@ -138,6 +145,8 @@ std::optional<Message> decode(std::span<const std::byte> payload) {
     case FlowOperation::dropped:
       return Dropped{known_reason(bytes[1]), NodeId{load_le<std::uint32_t>(bytes + 4)},
                      load_le<std::uint64_t>(bytes + 8)};
+    case FlowOperation::missed:
+      return Missed{GroupId{load_le<std::uint32_t>(bytes + 4)}, load_le<std::uint64_t>(bytes + 8)};
   }
   return std::nullopt;
 }

@@ -22,7 +22,8 @@ enum class FlowOperation : std::uint8_t {
   resume = 5,
   confirm = 6,
   skip = 7,
-  dropped = 8
+  dropped = 8,
+  missed = 9
 };
 
 /// Are you there? Times in ns since 1970.
@@ -92,7 +93,15 @@ struct Dropped {
   friend constexpr bool operator==(const Dropped&, const Dropped&) = default;
 };
 
-using Message = std::variant<Ping, Pong, Credit, Pause, Resume, Confirm, Skip, Dropped>;
+/// So many messages of the group were missed by the subscriptions of this node, in total: to a hub
+/// that offers proto::kFeatureMissed.
+struct Missed {
+  GroupId group;
+  std::uint64_t total = 0;
+  friend constexpr bool operator==(const Missed&, const Missed&) = default;
+};
+
+using Message = std::variant<Ping, Pong, Credit, Pause, Resume, Confirm, Skip, Dropped, Missed>;
 
 inline constexpr std::size_t kSizeMax = 24;
 

@@ -70,20 +70,21 @@ void write(JsonWriter& json, const std::vector<ConnectionRecord>& connections) {
     json.member("accepted", connection.accepted)
         .member("received_bytes", connection.received_bytes);
     json.member("delivered", connection.delivered).member("sent_bytes", connection.sent_bytes);
-    json.member("dropped", connection.dropped).end_object();
+    json.member("dropped", connection.dropped).member("missed", connection.missed).end_object();
   }
   json.end_array();
 }
 
 std::string connections_table(const std::vector<ConnectionRecord>& connections, Paint paint) {
   Table table({"ID", "NAME", "SHARD", "TRANSPORT", "STATE", "ACCEPTED", "DELIVERED", "DROPPED",
-               "QUEUED", "PEER"});
+               "MISSED", "QUEUED", "PEER"});
   for (const ConnectionRecord& connection : connections) {
     table.add({connection.node.text(), connection.name.empty() ? "-" : connection.name,
                std::to_string(connection.shard), connection.transport,
                connection.connected ? "connected" : "away", std::to_string(connection.accepted),
                std::to_string(connection.delivered), std::to_string(connection.dropped),
-               std::to_string(connection.queued_bytes), connection.peer},
+               std::to_string(connection.missed), std::to_string(connection.queued_bytes),
+               connection.peer},
               connection.connected ? Tone::plain : Tone::warning);
   }
   return table.text(paint);
@@ -238,17 +239,24 @@ std::string json_of(const std::vector<ServiceRecord>& services, const ProviderIn
   return json.end_array().str() + "\n";
 }
 
+/// The messages that its subscribers missed, and who missed most of them.
+std::string missed_of(const ServiceRecord& service) {
+  std::string words = std::to_string(service.missed);
+  if (service.missed != 0) words += " (most: " + service.missed_most.text() + ")";
+  return words;
+}
+
 std::string table_of(const std::vector<ServiceRecord>& services, const ProviderIndex& providers,
                      Paint paint) {
   Table table({"NAME", "NODE", "HUB", "STATE", "PLACE", "TYPE", "DIRECTION", "DELIVERY", "RETAIN",
-               "SUBSCRIBERS", "METADATA"});
+               "SUBSCRIBERS", "MISSED", "METADATA"});
   for (const ServiceRecord& service : services) {
     const Provider provider = providers.of(service.node);
     table.add({service.name, service.node.text(), service.hub_name, std::string(provider.state),
                provider.place.empty() ? "-" : std::string(provider.place),
                std::to_string(service.key.type) + "/" + std::to_string(service.key.instance),
                direction_of(service), delivery_of(service), service.retain ? "yes" : "no",
-               std::to_string(service.subscribers), service.metadata},
+               std::to_string(service.subscribers), missed_of(service), service.metadata},
               provider.state == "connected" ? Tone::plain : Tone::warning);
   }
   return table.text(paint);

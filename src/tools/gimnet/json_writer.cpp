@@ -142,7 +142,11 @@ void write(JsonWriter& json, const ServiceRecord& service, std::optional<Provide
   json.member("retain", service.retain);
   json.member("group", service.group_id).member("subscribers", service.subscribers);
   json.member("metadata", service.metadata).member("hub", service.hub_name);
-  if (provider) json.member("place", provider->place).member("state", provider->state);
+  if (provider) {
+    json.member("missed", service.missed);
+    if (service.missed != 0) json.member("missed_most", service.missed_most.text());
+    json.member("place", provider->place).member("state", provider->state);
+  }
   json.end_object();
 }
 

@@ -197,6 +197,27 @@ TEST(Inbox, TellsWhatWasTakenOfAWindowWhicheverWayItWent) {
   EXPECT_EQ(told, (std::vector<std::string>{"6x2", "7x1+", "7x1"}));
 }
 
+TEST(Inbox, TellsWhatWasMissedAtMostOnceASecond) {
+  int begun = 0;
+  int told = 0;
+  Inbox inbox(2, 1000, [] {}, {}, {[&begun] { ++begun; }, [&told] { ++told; }});
+  MessageQueue& queue = inbox.add_queue({1, AtFullQueue::overwrite_oldest});
+  const auto put = [&] {
+    Message message = make_message("x", 1, {});
+    EXPECT_TRUE(inbox.put(queue, message, nullptr));
+  };
+  put();
+  EXPECT_EQ(begun, 0);
+  for (int i = 0; i < 3; ++i) put();
+  EXPECT_EQ(begun, 1);
+  EXPECT_FALSE(inbox.tick());
+  EXPECT_EQ(told, 1);
+  put();
+  EXPECT_EQ(begun, 2);
+  EXPECT_TRUE(inbox.tick()) << "it will have to be told";
+  EXPECT_EQ(told, 1) << "but not yet";
+}
+
 // Or 1,024 messages of a stranger would close the node to new keys for ever.
 TEST_F(InboxTest, OfTooManyKeysForgetsAnEmptyQueueOrTheOldest) {
   for (std::uint32_t type = 0; type < Inbox::kUnaskedKeysMax; ++type) EXPECT_TRUE(put({type, 0}));

@@ -164,6 +164,21 @@ TEST_F(Wishes, EachSubscriptionHasAQueueOfItsOwn) {
   EXPECT_EQ(publisher_->subscribers(), 1u) << "the hub sends once";
 }
 
+TEST_F(Wishes, WhatTheyMissIsToldToTheHub) {
+  offer(Delivery::stream);
+  const Subscription newest = subscribe({.newest_only = true});
+  const auto told = [&] {
+    const auto services = robot_.services("robot/eye").or_throw();
+    return std::pair(services.at(0).missed, services.at(0).missed_most);
+  };
+  EXPECT_EQ(told(), std::pair(std::uint64_t{0}, Peer{}));
+  publish_slowly(newest);
+  EXPECT_TRUE(eventually([&] { return told().first == newest.missed(); }));
+  EXPECT_EQ(told(), std::pair(std::uint64_t(kMessages) - 1, viewer_.peer()));
+  for (const ConnectionRecord& each : robot_.hub_connections(kWait).or_throw())
+    EXPECT_EQ(each.missed, each.node == viewer_.peer() ? newest.missed() : 0u);
+}
+
 TEST_F(Wishes, OneThatIsNotTakenHoldsNoOtherOfThatServiceUp) {
   offer(Delivery::sync, 1);
   const Subscription idle = subscribe({});

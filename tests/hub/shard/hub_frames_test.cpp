@@ -222,6 +222,37 @@ TEST(HubFrames, ClosesForCreditsOfNoUseBeyondTheLimit) {
   EXPECT_EQ(rig.sum(&ShardCounters::oddities), 1u);
 }
 
+TEST(HubFrames, TellsTheConductorOfMissedMessagesOnceASecondForEachSubscription) {
+  Limits limits;
+  limits.oddities_burst = 1;
+  limits.subscriptions_per_node = 2;
+  HubRig rig(1, limits);
+  FakeNode& a = rig.join(0);
+  const proto::flow::Missed missed{make_id<GroupId>(HubId{7}, 5), 12};
+  const auto told = [&] {
+    rig.send_flow(a, missed);
+    rig.settle();
+    std::size_t events = 0;
+    for (const ShardEvent& event : rig.take_events()) {
+      const auto* of = std::get_if<MissedEvent>(&event.what);
+      if (of != nullptr && of->node == a.id && of->missed == missed) ++events;
+    }
+    return events;
+  };
+  EXPECT_EQ(told(), 1u);
+  EXPECT_EQ(told(), 1u);
+  EXPECT_EQ(told(), 0u) << "that of a third subscription";
+  EXPECT_EQ(rig.sum(&ShardCounters::bad_credits), 1u);
+  rig.pass_ms(1'000);
+  EXPECT_EQ(told(), 1u);
+  EXPECT_EQ(told(), 1u);
+  EXPECT_FALSE(a.goodbye);
+  EXPECT_EQ(told(), 0u);
+  EXPECT_EQ(told(), 0u);
+  ASSERT_TRUE(a.goodbye);
+  EXPECT_EQ(a.goodbye->code, GoodbyeCode::oddities);
+}
+
 TEST(HubFrames, TakesASkipUpToTheLastCountThatThereIs) {
   HubRig rig;
   FakeNode& a = rig.join(0, {.resume = true});

@@ -121,6 +121,7 @@ TEST(CtrlMessages, AConnectionMayComeWithoutCounts) {
 
 TEST(CtrlMessages, RecordsFitInTheBytesThatArePlannedForThem) {
   ConnectionRecord record;
+  record.counts.missed = UINT64_MAX;
   record.name.assign(kNameBytesMax, 'n');
   record.transport.assign(kRemarkBytesMax, 't');
   record.peer.assign(kRemarkBytesMax, 'p');

@@ -76,7 +76,7 @@ TEST(NsMessages, ListRecordsAsTheVectorsSay) {
 
   ServicesAnswer services;
   services.services = {{kGroup, "robot/odom", NodeId{0x00700011}, 3, 1, Direction::provides,
-                        Delivery::latest, "x y theta", 2, "lab"}};
+                        Delivery::latest, "x y theta", 2, "lab", 0, false, 0, {}}};
   expect_answer("ns/services_answer", 6, services);
 }
 
@@ -135,6 +135,8 @@ TEST(NsMessages, RecordsFitInTheBytesThatArePlannedForThem) {
   service.name.assign(kNameBytesMax, 'n');
   service.metadata.assign(kMetadataBytesMax, 'm');
   service.hub_name.assign(kNameBytesMax, 'h');
+  service.missed = UINT64_MAX;
+  service.missed_most = NodeId{UINT32_MAX};
   EXPECT_LE(size_of(ServicesAnswer{{service}, false, {}}) - size_of(ServicesAnswer{}),
             page_bytes_max(service));
 }

@@ -30,6 +30,7 @@ const std::vector<std::pair<std::string, Message>>& examples() {
       {"flow/skip", Skip{DropReason::queue_full, 12}},
       {"flow/skip_unknown", Skip{DropReason::none, kSkipUnknown}},
       {"flow/dropped", Dropped{DropReason::queue_full, NodeId{0x00700012}, 12}},
+      {"flow/missed", Missed{GroupId{0x00700005}, 12}},
   };
   return kExamples;
 }
@@ -75,7 +76,7 @@ TEST(Flow, RefusesAShorterPayload) {
 
 TEST(Flow, RefusesUnknownOperations) {
   Bytes payload(kSizeMax);
-  for (const int operation : {0, 9, 255}) {
+  for (const int operation : {0, 10, 255}) {
     payload[0] = static_cast<std::byte>(operation);
     EXPECT_EQ(decode(payload), std::nullopt) << operation;
   }

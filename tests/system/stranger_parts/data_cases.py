@@ -5,10 +5,11 @@ import struct
 import time
 
 from stranger_parts import client as wire
-from stranger_parts.bitestream import BOOL, TEXT, U8, put
+from stranger_parts.bitestream import BOOL, TEXT, U8, every, fields, put
 from stranger_parts.case import Case
 from stranger_parts.client import BROADCAST, FLOW, GROUP, LIST, NS, SERVICE, TAKEN, UNICAST, u32
 from support.processes import start_recv
+from support.waiting import wait_until
 
 
 class Data(Case):
@@ -57,6 +58,14 @@ class Data(Case):
         self.assertEqual([viewer.data(GROUP).body for _ in range(2)], [b"\0", b"\1"])
         viewer.flow(wire.CREDIT, struct.pack("<IQ", group, 2), number=5)
         self.assertEqual(viewer.data(GROUP).body, b"\x08", "the newest of those that waited")
+        self.assertEqual(viewer.welcome[7] & 1, 1, "the hub takes MISSED")
+        viewer.flow(wire.MISSED, struct.pack("<IQ", group, 6))
+        viewer.ping()
+
+        def missed():
+            service = fields(every(robot.ask(NS, 9, put(3, TEXT, "robot/map")), 3)[0])
+            return service.get(13), service.get(14)
+        wait_until(lambda: missed() == (6, viewer.id), "the hub to know what was missed")
         late = self.stranger(hub)
         late.subscribe("robot/map")
         self.assertEqual(late.data(GROUP).body, b"\x08", "the last one is kept")

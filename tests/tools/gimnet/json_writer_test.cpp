@@ -76,8 +76,14 @@ TEST(RecordJson, OfAService) {
   EXPECT_EQ(json.str().find("place"), std::string::npos) << "it is not known here";
   JsonWriter placed;
   write(placed, service, Provider{"127.0.0.1:4000", "away"});
-  EXPECT_TRUE(placed.str().ends_with(R"("hub":"lab","place":"127.0.0.1:4000","state":"away"})"))
+  EXPECT_TRUE(
+      placed.str().ends_with(R"("hub":"lab","missed":0,"place":"127.0.0.1:4000","state":"away"})"))
       << placed.str();
+  service.missed = 12;
+  service.missed_most = Peer{(7u << 20) | 18};
+  JsonWriter slow;
+  write(slow, service, Provider{"127.0.0.1:4000", "away"});
+  EXPECT_NE(slow.str().find(R"("missed":12,"missed_most":"7.18",)"), std::string::npos);
   service.direction = Direction::accepts;
   EXPECT_STREQ(direction_of(service), "accepts");
   service.key.type = GIMI_REQUEST_TYPE;

@@ -50,8 +50,13 @@ ctrl::StatisticsAnswer statistics(const HandlerContext& context) {
 }
 
 ctrl::ConnectionCounts counts_of(const SessionCounts& counts) {
-  return {counts.queued_bytes, counts.accepted,   counts.received_bytes,
-          counts.delivered,    counts.sent_bytes, counts.dropped};
+  return {counts.queued_bytes,
+          counts.accepted,
+          counts.received_bytes,
+          counts.delivered,
+          counts.sent_bytes,
+          counts.dropped,
+          0};
 }
 
 ctrl::ConnectionsAnswer connections(const HandlerContext& context,
@@ -73,6 +78,7 @@ ctrl::ConnectionsAnswer connections(const HandlerContext& context,
       record.counts =
           counts_of(context.sessions[shard]->counts(session.place.slot, session.place.generation));
     }
+    record.counts.missed = context.membership.services().missed_by(session.index);
     if (!budget.take(ctrl::page_bytes_max(record))) {
       answer.more = true;
       break;

@@ -119,6 +119,17 @@ Result<ns::AdvertiseAnswer, proto::Refusal> advertise(HandlerContext& context,
   return ns::AdvertiseAnswer{group_id(context, done->group), done->subscribers};
 }
 
+/// The messages that the subscribers at this hub missed.
+void put_missed(ns::ServiceRecord& record, HubId hub, const Topic& topic) {
+  std::uint64_t most = 0;
+  for (const auto& [subscriber, missed] : topic.missed) {
+    record.missed += missed;
+    if (missed <= most) continue;
+    most = missed;
+    record.missed_most = make_id(hub, subscriber);
+  }
+}
+
 Result<ns::ServicesAnswer, proto::Refusal> services(const HandlerContext& context,
                                                     const Request& request,
                                                     const ns::ServicesRequest& wanted) {
@@ -138,15 +149,21 @@ Result<ns::ServicesAnswer, proto::Refusal> services(const HandlerContext& contex
       [&](const KnownName& known) -> std::optional<ns::ServiceRecord> {
         if (pattern && !pattern->matches(known.name)) return std::nullopt;
         ns::ServiceRecord record = service_record_of(known);
-        if (const Topic* topic = own.find(record.name))
+        if (const Topic* topic = own.find(record.name)) {
           record.subscribers = topic->subscriber_count();
+          put_missed(record, title.id, *topic);
+        }
         return record;
       },
       [&](std::uint32_t after) {
         return list_services(own, {pattern ? &*pattern : nullptr, GroupIndex{after}, false,
                                    context.limits.page_records, context.limits.scan_records});
       },
-      [&](GroupIndex index) { return record_of(title, *own.find_group(index)); });
+      [&](GroupIndex index) {
+        ns::ServiceRecord record = record_of(title, *own.find_group(index));
+        put_missed(record, title.id, *own.find_group(index));
+        return record;
+      });
   return ns::ServicesAnswer{page.take_records(), page.more(), page.next()};
 }
 

@@ -214,4 +214,24 @@ void Services::forget_if_idle(NodeIndex node) {
   if (found->second.provides.empty() && found->second.subscribes.empty()) nodes_.erase(found);
 }
 
+void Services::note_missed(NodeIndex node, const proto::flow::Missed& missed) {
+  const Topic* topic = topics_.find_group(missed.group);
+  const auto found = nodes_.find(node);
+  if (topic == nullptr || found == nodes_.end()) return;
+  auto& list = found->second.subscribes;
+  if (const auto declared = find_topic(list, *topic); declared != list.end())
+    declared->topic->missed[node] = missed.total;
+}
+
+std::uint64_t Services::missed_by(NodeIndex node) const {
+  const auto found = nodes_.find(node);
+  if (found == nodes_.end()) return 0;
+  std::uint64_t sum = 0;
+  for (const Declared& declared : found->second.subscribes) {
+    const auto told = declared.topic->missed.find(node);
+    if (told != declared.topic->missed.end()) sum += told->second;
+  }
+  return sum;
+}
+
 }  // namespace gimnet::hub

@@ -12,6 +12,7 @@
 #include "hub/control/state/topics.hpp"
 #include "hub/limits.hpp"
 #include "proto/control/control_message.hpp"
+#include "proto/frame/flow.hpp"
 
 namespace gimnet::hub {
 
@@ -57,6 +58,12 @@ class Services {
   void node_renumbered(NodeIndex node_index, NodeIndex new_index, Effects& effects);
   /// The node's session is over.
   void node_left(NodeIndex node_index, std::chrono::milliseconds now, Effects& effects);
+
+  /// A node tells what it missed of a group in total. Nothing if it has not subscribed to it (any
+  /// more).
+  void note_missed(NodeIndex node, const proto::flow::Missed& missed);
+  /// The same of all its subscriptions.
+  [[nodiscard]] std::uint64_t missed_by(NodeIndex node) const;
 
   /// The node's subscriptions that had news for subscribers since that change, the latest last.
   [[nodiscard]] std::vector<const Topic*> moved_since(NodeIndex node, std::uint64_t change) const;

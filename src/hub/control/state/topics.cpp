@@ -118,6 +118,7 @@ void Topics::remove_subscriber(Topic& topic, NodeIndex subscriber, milliseconds 
   topic.terms.erase(subscriber);
   topic.once_plain.erase(subscriber);
   topic.once_paced.erase(subscriber);
+  topic.missed.erase(subscriber);
   list.erase(place);
   if (topic.away) {
     effects.emplace_back(MemberChanged{topic.away->group, subscriber});
@@ -145,6 +146,10 @@ void Topics::renumber_subscriber(Topic& topic, NodeIndex former, NodeIndex subsc
   }
   for (auto* changed : {&topic.once_plain, &topic.once_paced}) {
     if (changed->erase(former) != 0) changed->insert(subscriber);
+  }
+  if (auto told = topic.missed.extract(former)) {
+    told.key() = subscriber;
+    topic.missed.insert(std::move(told));
   }
   // It may not have joined the group yet, and be passed over now that it stands elsewhere.
   if (!topic.group(hub_)) return;

@@ -65,6 +65,8 @@ struct Topic {
   std::uint64_t orphan = 0;  ///< since when, in order, nobody provides the group; 0: somebody does
   std::uint64_t unused = 0;  ///< since when nobody has subscribed either; 0: it is used
   std::uint32_t links = 0;   ///< that lead to subscribers at other hubs
+  /// Messages that subscribers said they missed, of those that missed some.
+  std::unordered_map<NodeIndex, std::uint64_t> missed;
 
   [[nodiscard]] bool provided() const { return service && service->provider != kNobody; }
   /// Whose messages subscribers get, from this hub or another one; nothing: no group.

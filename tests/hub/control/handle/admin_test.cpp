@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <utility>
+#include <vector>
 
 #include "base/log.hpp"
 #include "hub/config/options.hpp"
@@ -130,9 +132,43 @@ TEST_F(AdminTest, TellsWhatEachNodeCameTo) {
   its.sent_bytes.add(4);
   its.dropped.add(5);
   shard.set_queued(robot.session.slot, 6);
-  EXPECT_EQ(counts(), (ctrl::ConnectionCounts{6, 1, 2, 3, 4, 5}));
+  EXPECT_EQ(counts(), (ctrl::ConnectionCounts{6, 1, 2, 3, 4, 5, 0}));
   static_cast<void>(shard.begin(robot.session.slot, robot.session.generation - 1));
   EXPECT_EQ(counts(), ctrl::ConnectionCounts{}) << "those are another session's";
+}
+
+TEST_F(AdminTest, TellsWhatEachNodeAndServiceMissedAndWhoMissedMost) {
+  const Node robot = join("robot");
+  const Node viewer = join("viewer");
+  const Node slow = join("slow");
+  const auto offered = ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "odom"});
+  ASSERT_TRUE(offered);
+  const auto tell = [&](const Node& node, std::uint64_t total) {
+    conductor.on_event({node.shard, MissedEvent{node.session, node.id, {offered->group, total}}},
+                       now);
+  };
+  const auto of_service = [&] {
+    const auto listed = ask<ns::ServicesAnswer>(robot, ns::ServicesRequest{});
+    return std::pair{listed->services[0].missed, listed->services[0].missed_most};
+  };
+  const auto of_nodes = [&] {
+    std::vector<std::uint64_t> missed;
+    for (const auto& each :
+         ask_hub<ctrl::ConnectionsAnswer>(robot, ctrl::Connections{}).connections)
+      missed.push_back(each.counts.missed);
+    return missed;
+  };
+  tell(viewer, 5);
+  EXPECT_EQ(of_service(), std::pair(std::uint64_t{0}, NodeId{})) << "it is no subscriber";
+  for (const Node& node : {viewer, slow})
+    ASSERT_TRUE(ask<ns::SubscribeAnswer>(node, ns::Subscribe{.name = "robot/odom"}));
+  tell(viewer, 5);
+  tell(slow, 4);
+  tell(slow, 9);
+  EXPECT_EQ(of_service(), std::pair(std::uint64_t{14}, slow.id));
+  EXPECT_EQ(of_nodes(), (std::vector<std::uint64_t>{0, 5, 9}));
+  ASSERT_TRUE(ask<ns::UnsubscribeAnswer>(slow, ns::Unsubscribe{"robot/odom"}));
+  EXPECT_EQ(of_service(), std::pair(std::uint64_t{5}, viewer.id));
 }
 
 }  // namespace

@@ -199,6 +199,26 @@ TEST_F(ServicesTest, ASubscriberThatIsRenumberedKeepsItsTerms) {
   EXPECT_THAT(take_words(), IsEmpty()) << "declared again, the same";
 }
 
+TEST_F(ServicesTest, CountsWhatASubscriberMissesUntilItEnds) {
+  for (const char* name : {"robot/odom", "robot/map"}) {
+    advertise(kRobot, name);
+    EXPECT_EQ(subscribe(kViewer, name), Status::done);
+  }
+  const auto group = [](std::uint32_t index) { return make_id(HubId{7}, GroupIndex{index}); };
+  services_.note_missed(kViewer, {group(1), 3});
+  services_.note_missed(kViewer, {group(2), 4});
+  services_.note_missed(kLogger, {group(1), 5});
+  services_.note_missed(kViewer, {group(9), 5});
+  EXPECT_EQ(services_.missed_by(kViewer), 7u);
+  EXPECT_EQ(services_.missed_by(kLogger), 0u) << "it has not subscribed";
+  services_.node_renumbered(kViewer, NodeIndex{40}, effects_);
+  EXPECT_EQ(services_.missed_by(NodeIndex{40}), 7u);
+  EXPECT_FALSE(services_.unsubscribe(NodeIndex{40}, "robot/odom", now_, effects_));
+  EXPECT_EQ(services_.missed_by(NodeIndex{40}), 4u);
+  EXPECT_EQ(subscribe(NodeIndex{40}, "robot/odom"), Status::done);
+  EXPECT_EQ(services_.missed_by(NodeIndex{40}), 4u) << "it begins anew";
+}
+
 TEST_F(ServicesTest, ASubscriberOfAStreamIsPacedOnlyIfItWantsAWindowOrARate) {
   EXPECT_EQ(advertise(kRobot, "robot/odom"), GroupIndex{1});
   EXPECT_TRUE(services_.subscribe(kLogger, "robot/odom", {.window = 2, .depth = 3}, effects_));
