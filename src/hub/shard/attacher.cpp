@@ -125,7 +125,7 @@ std::uint64_t Attacher::settle_counts(Connection& connection, AttachCommand& com
 
 bool Attacher::go_on(Connection& connection, const AttachCommand& command, Run& partial,
                      std::uint64_t& gap) {
-  RingQueue<Run> replay;
+  RunQueue replay;
   const ResumeBuffer::Rewind rewind = connection.resume->kept.rewind(command.known_taken, replay);
   // A count that cannot be: this peer's life is not the one that we know.
   if (!rewind.possible) return false;
@@ -136,10 +136,10 @@ bool Attacher::go_on(Connection& connection, const AttachCommand& command, Run& 
   connection.outbox.count_dropped(rewind.lost);
   state_.tally.drop(proto::DropReason::link_lost, rewind.lost);
   state_.tally.queued -= static_cast<std::int64_t>(rewind.confirmed + rewind.lost);
-  if (partial.frames != 0) replay.push_back(std::move(partial));
-  RingQueue<Run>& waiting = connection.outbox.replay();
-  for (; !waiting.empty(); waiting.pop_front()) replay.push_back(std::move(waiting.front()));
-  connection.outbox.set_replay(std::move(replay));
+  if (partial.frames != 0) replay.push(std::move(partial));
+  RingQueue<Run>& waiting = connection.outbox.replay().runs();
+  for (; !waiting.empty(); waiting.pop_front()) replay.push(std::move(waiting.front()));
+  connection.outbox.replay() = std::move(replay);
   connection.resume->taken_told = connection.resume->taken;
   connection.resume->bytes_since_told = 0;
   connection.resume->peer_resume_bytes = command.peer_resume_bytes;

@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include "base/ids.hpp"
+#include "hub/data/egress/entry.hpp"
 
 namespace gimnet::hub {
 
@@ -15,6 +16,11 @@ class CountedGroups {
   [[nodiscard]] virtual bool counts(GroupId group) const = 0;
   /// So many messages of the group that were on their way to the recipient do not reach it.
   virtual void on_lost(GroupId group, std::uint32_t messages) = 0;
+  /// The messages that these were of do not reach it.
+  void on_entry_lost(const Entry& entry);
+  void on_run_lost(const Run& run);
+  /// As on_run_lost(), with the header that all its frames have.
+  void on_run_lost(const Run& run, const proto::FrameHeader& header);
 
  protected:
   ~CountedGroups() = default;

@@ -27,6 +27,21 @@ struct Entry {
   bool extended = false;  ///< has EXT: looked at when its turn comes
   bool shared = false;    ///< fanned out to many: stays a reference while it waits
 
+  /// `run` with that header, to be sent as the header asks. `shared`: fanned out to many.
+  [[nodiscard]] static Entry of(Run run, const proto::FrameHeader& header, bool shared) {
+    Entry entry;
+    entry.size = run.size;
+    entry.frames = run.frames;
+    entry.run = std::move(run);
+    entry.block = proto::is_block(header);
+    entry.latest = header.policy() == proto::Policy::latest;
+    entry.extended = header.has(proto::kFlagExt);
+    entry.shared = shared;
+    if (header.has(proto::kFlagFragment)) entry.note_fragment();
+    return entry;
+  }
+  /// Messages of which the end is in it.
+  [[nodiscard]] std::uint32_t messages() const { return fragmented ? (complete ? 1 : 0) : frames; }
   void append(Run piece, PiecePool& pool) {
     size += piece.size;
     frames += piece.frames;
@@ -46,6 +61,10 @@ struct Entry {
     if (!more) last = nullptr;
     return true;
   }
+
+ private:
+  /// Reads where the frame stands in its message.
+  void note_fragment();
 };
 
 }  // namespace gimnet::hub

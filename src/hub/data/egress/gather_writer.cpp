@@ -79,11 +79,11 @@ void GatherWriter::gather(Batch& batch, Job& job) {
     batch.add(Source::partial, partial_.run.bytes + partial_.offset,
               partial_.run.size - partial_.offset);
   }
-  gather_queue(batch, Source::control, job.outbox.control(), job);
+  gather_queue(batch, Source::control, job.outbox.control().runs(), job);
   if (!job.outbox.has_lanes()) return;
-  RingQueue<Run>& replay = job.outbox.replay();
+  RunQueue& replay = job.outbox.replay();
   if (!replay.empty()) {
-    gather_queue(batch, Source::replay, replay, job);
+    gather_queue(batch, Source::replay, replay.runs(), job);
     // Frames that the peer missed come before anything newer.
     return;
   }
@@ -272,15 +272,10 @@ std::uint32_t GatherWriter::consume_run(Run& run, std::size_t bytes, bool contro
   return left;
 }
 
-void GatherWriter::consume_queue(RingQueue<Run>& queue, std::size_t bytes, bool control, Job& job) {
-  Run& run = queue.front();
-  const std::uint32_t left = consume_run(run, bytes, control, false, job);
-  if (control) {
-    job.outbox.on_control_left(left);
-  } else {
-    job.outbox.on_replay_left(left);
-  }
-  if (run.frames == 0) queue.pop_front();
+void GatherWriter::consume_queue(RunQueue& queue, std::size_t bytes, bool control, Job& job) {
+  Run& run = queue.runs().front();
+  queue.on_left(consume_run(run, bytes, control, false, job));
+  if (run.frames == 0) queue.runs().pop_front();
 }
 
 void GatherWriter::consume_lane(std::size_t lane, std::size_t bytes, Job& job) {

@@ -98,7 +98,7 @@ class GatherWriter {
   void consume_partial(std::size_t bytes, Job& job);
   [[nodiscard]] std::uint32_t consume_run(Run& run, std::size_t bytes, bool control, bool shared,
                                           Job& job);
-  void consume_queue(RingQueue<Run>& queue, std::size_t bytes, bool control, Job& job);
+  void consume_queue(RunQueue& queue, std::size_t bytes, bool control, Job& job);
   void consume_lane(std::size_t lane, std::size_t bytes, Job& job);
   static void finish(Run run, bool control, bool shared, Job& job);
   static void keep_in_pieces(Run run, bool shared, Job& job);

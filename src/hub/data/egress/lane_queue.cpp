@@ -205,6 +205,18 @@ void LaneQueue::close_gap(std::uint64_t number) {
   entries_.at(number) = Entry{};
 }
 
+std::uint64_t LaneQueue::messages_of(GroupId group) {
+  std::uint64_t messages = 0;
+  for (std::uint64_t number = entries_.first_number(); number != entries_.end_number(); ++number) {
+    const Entry& entry = entries_.at(number);
+    if (entry.frames == 0) continue;
+    const proto::FrameHeader header = entry.run.header();
+    if (header.kind == proto::Kind::group && header.dst == group.value())
+      messages += entry.messages();
+  }
+  return messages;
+}
+
 NodeId LaneQueue::source_at(std::uint8_t place) {
   const std::uint64_t end = std::min(entries_.end_number(), entries_.first_number() + kSearchMax);
   for (std::uint64_t number = entries_.first_number(); number != end; ++number) {

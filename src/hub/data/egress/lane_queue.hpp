@@ -1,7 +1,9 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
+#include <utility>
 
 #include "hub/data/egress/entry.hpp"
 #include "hub/data/egress/source_bytes.hpp"
@@ -34,6 +36,16 @@ class LaneQueue {
   }
   /// Bytes of entries that must not be dropped for room.
   [[nodiscard]] std::uint64_t block_bytes() const { return block_bytes_; }
+  /// Bytes that still fit in a lane of `bytes_max`: of messages sent with BLOCK into half of it, of
+  /// others into what those leave, at least the other half.
+  [[nodiscard]] std::uint64_t room(bool block, std::uint64_t bytes_max) const {
+    const std::uint64_t half = bytes_max / 2;
+    if (block) return half - std::min(half, block_bytes_);
+    const std::uint64_t share = bytes_max - std::min(half, block_bytes_);
+    return share - std::min(share, bytes_ - block_bytes_);
+  }
+  /// Messages of that group of which the end waits.
+  [[nodiscard]] std::uint64_t messages_of(GroupId group);
   /// Does a message wait of which nothing was written yet? The others are finished whatever
   /// happens.
   [[nodiscard]] bool holds_whole() const { return bytes_ != touched_bytes_; }
@@ -98,6 +110,14 @@ class LaneQueue {
   /// false if nothing may be dropped.
   [[nodiscard]] bool drop_oldest(Entry& dropped);
 
+  /// Takes out the entries for which which(const Entry&) is true, and calls lose(Entry&) for each.
+  template <class Which, class Lose>
+  void lose_all(Which&& which, Lose&& lose);
+  /// Calls settle(Entry&) for those that came since the last call, and again for the newest of
+  /// then, which may have grown.
+  template <class Settle>
+  void settle(Settle&& settle);
+
   /// The oldest entry that is neither dropped nor replaced. REQUIRES: there is one.
   [[nodiscard]] Entry& front();
   /// The front entry's first frame, or first piece, has left: keeps the sums right. The entry
@@ -140,6 +160,7 @@ class LaneQueue {
   std::uint64_t block_bytes_ = 0;
   std::uint64_t latest_bytes_ = 0;
   std::uint64_t touched_bytes_ = 0;
+  std::uint64_t settled_ = 0;    ///< entries below this number are settled
   bool counts_sources_ = false;  ///< sources_ has all that waits
   SourceBytes sources_;
   std::uint64_t oldest_hint_ = 0;  ///< no droppable entry has a lower number
@@ -163,6 +184,28 @@ void LaneQueue::replace_all_latest(Lose&& lose) {
     } else {
       push(std::move(entry));
     }
+  }
+}
+
+template <class Which, class Lose>
+void LaneQueue::lose_all(Which&& which, Lose&& lose) {
+  for (std::uint64_t number = entries_.first_number(); number != entries_.end_number(); ++number) {
+    Entry& entry = entries_.at(number);
+    if (entry.frames == 0 || !which(std::as_const(entry))) continue;
+    on_left(entry, entry.size);
+    lose(entry);
+  }
+  skip_dead();
+}
+
+template <class Settle>
+void LaneQueue::settle(Settle&& settle) {
+  settled_ = std::max(settled_, entries_.first_number());
+  for (; settled_ < entries_.end_number(); ++settled_) {
+    Entry& entry = entries_.at(settled_);
+    if (entry.frames != 0) settle(entry);
+    // The last entry may grow until the next turn: it is looked at again then.
+    if (settled_ + 1 == entries_.end_number()) break;
   }
 }
 

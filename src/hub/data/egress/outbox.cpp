@@ -1,26 +1,14 @@
 #include "hub/data/egress/outbox.hpp"
 
 #include <algorithm>
-#include <cstring>
 #include <utility>
 
 #include "proto/frame/frame_parser.hpp"
 
 namespace gimnet::hub {
-namespace {
-constexpr std::uint32_t kFirstChunkBytes = 256 - kBufferRoom;
-constexpr std::uint32_t kChunkGrowth = 4;  // from one size of the pool to the next
-}  // namespace
-
-std::uint64_t Outbox::data_bytes() const {
-  if (!lanes_) return 0;
-  std::uint64_t bytes = 0;
-  for (const LaneQueue& queue : lanes_->queues) bytes += queue.bytes();
-  return bytes;
-}
 
 std::uint64_t Outbox::waiting_bytes() const {
-  std::uint64_t bytes = control_bytes_ + data_bytes();
+  std::uint64_t bytes = control_.bytes() + data_bytes();
   if (lanes_ && !lanes_->replay.empty())
     bytes += 1;  // how many does not matter: they were counted as waiting all along
   return bytes;
@@ -33,94 +21,34 @@ std::uint64_t Outbox::stale_bytes() const {
   return bytes;
 }
 
-bool Outbox::has_block() const {
-  return lanes_ && std::ranges::any_of(lanes_->queues, [](const LaneQueue& each) {
-           return each.block_bytes() != 0;
-         });
-}
-
-std::uint64_t Outbox::room(std::size_t lane, bool block, const Limits& limits) const {
-  const LaneQueue& queue = lanes_->queues[lane];
-  const std::uint64_t half = limits.lane_bytes(lane) / 2;
-  if (block) return half - std::min(half, queue.block_bytes());
-  const std::uint64_t share = limits.lane_bytes(lane) - std::min(half, queue.block_bytes());
-  return share - std::min(share, queue.bytes() - queue.block_bytes());
-}
-
 std::uint64_t Outbox::held_bytes() const {
-  std::uint64_t bytes = control_bytes_ + paced_bytes_;
+  std::uint64_t bytes = control_.bytes() + paced_bytes_;
   if (resume_ != nullptr) bytes += resume_->bytes();
   if (!lanes_) return bytes;
   for (const LaneQueue& queue : lanes_->queues) bytes += queue.held_bytes();
-  return bytes + lanes_->replay_bytes;
+  return bytes + lanes_->replay.bytes();
 }
 
 void Outbox::note_waiting(EgressContext& context) {
   const bool waits = held_bytes() != 0;
   if (waits == waits_) return;
   waits_ = waits;
-  if (waits) {
-    context.budget.begin_waiting();
-  } else {
-    context.budget.end_waiting();
-  }
-}
-
-Run Outbox::copy_alone(const Run& run, EgressContext& context) {
-  BufferRef chunk = context.pool.take_exact(run.size);
-  std::memcpy(chunk->data, run.bytes, run.size);
-  context.tally.copied_bytes += run.size;
-  const std::byte* const bytes = chunk->data;
-  return Run{std::move(chunk), bytes, run.size, run.frames};
+  waits ? context.budget.begin_waiting() : context.budget.end_waiting();
 }
 
 Run Outbox::copy(const Run& run, EgressContext& context) {
-  if (context.budget.scarce() && run.size >= BufferPool::kExactBytesMin)
-    return copy_alone(run, context);
   close_run();
-  if (!chunk_ || chunk_->capacity - chunk_used_ < run.size) {
-    // A large one saves entries and calls where there is room; where there is little, each outbox
-    // takes what it must.
-    const bool little = context.budget.scarce() || context.budget.exhausted();
-    chunk_bytes_ =
-        little ? 0 : std::clamp(kChunkGrowth * chunk_bytes_, kFirstChunkBytes, kSharedChunkBytes);
-    chunk_ = context.pool.take_chunk(std::max(run.size, chunk_bytes_));
-    chunk_used_ = 0;
-    // At once where something waits: by the end of the turn many outboxes may have begun one.
-    if (backlog_) context.pool.pin(*chunk_.get());
-  }
-  std::byte* place = chunk_->data + chunk_used_;
-  std::memcpy(place, run.bytes, run.size);
-  chunk_used_ += run.size;
-  context.tally.copied_bytes += run.size;
-  return Run{chunk_.share(), place, run.size, run.frames};
+  return chunk_.copy(run, backlog_, context);
 }
 
 Entry Outbox::make_entry(const Run& run, const proto::FrameHeader& header, Handover handover,
                          bool has_room, EgressContext& context) {
-  Entry entry;
-  entry.extended = header.has(proto::kFlagExt);
   // Frames that will probably be refused are not copied: they would fill a chunk that others keep.
   // Those that stay are copied at the turn's end. An extension may be a TRACE, which each recipient
   // gets filled in on its own.
   const bool by_copy =
-      (run.size < kAppendBytesMax && !handover.fan_out && has_room) || entry.extended;
-  entry.run = by_copy ? copy(run, context) : run.share();
-  entry.size = run.size;
-  entry.frames = run.frames;
-  entry.block = proto::is_block(header);
-  entry.latest = header.policy() == proto::Policy::latest;
-  entry.shared = handover.fan_out;
-  if (header.has(proto::kFlagFragment)) {
-    const auto frame = proto::parse_frame({entry.run.bytes, entry.run.size}, proto::Origin::hub);
-    if (frame && frame->fragment) {
-      entry.fragmented = true;
-      entry.message_number = frame->fragment->message;
-      entry.touched = frame->fragment->offset != 0;  // unless its beginning still waits
-      entry.complete = frame->fragment->offset + frame->payload.size() == frame->fragment->total;
-    }
-  }
-  return entry;
+      (run.size < kAppendBytesMax && !handover.fan_out && has_room) || header.has(proto::kFlagExt);
+  return Entry::of(by_copy ? copy(run, context) : run.share(), header, handover.fan_out);
 }
 
 void Outbox::push(const Run& run, const proto::FrameHeader& header, Handover handover,
@@ -144,11 +72,12 @@ void Outbox::push(const Run& run, const proto::FrameHeader& header, Handover han
   Entry entry = make_entry(run, header, handover, has_room && !by_share, context);
   if (by_share) make_share(entry, header, context);
   if (entry.fragmented) {
-    if (!follow_message(entry, context)) return;
+    if (!lanes.open_messages.follow(entry))
+      return lose(entry, proto::DropReason::cut_message, context);
     if (entry.touched && join_message(entry, header, context)) return;
   }
   if (!backlog_ && has_room) {
-    const bool may_grow = proto::may_form_run(header) && entry.run.buffer.get() == chunk_.get();
+    const bool may_grow = proto::may_form_run(header) && chunk_.holds(entry.run);
     lanes.queues[lane].push(std::move(entry));
     if (may_grow) open_run(lanes.queues[lane], context.limits, lane);
     return;
@@ -158,7 +87,7 @@ void Outbox::push(const Run& run, const proto::FrameHeader& header, Handover han
 
 void Outbox::open_run(LaneQueue& lane, const Limits& limits, std::size_t lane_index) {
   Entry& last = lane.entries().back();
-  std::uint32_t open_room = chunk_->capacity - chunk_used_;
+  std::uint32_t open_room = chunk_.room();
   if (!surely_fits(lane.bytes() + open_room, lane_index, limits)) {
     open_room = static_cast<std::uint32_t>(
         std::min<std::uint64_t>(open_room, room(lane_index, last.block, limits)));
@@ -166,7 +95,7 @@ void Outbox::open_run(LaneQueue& lane, const Limits& limits, std::size_t lane_in
   lanes_->open = {open_room,
                   load_le<std::uint32_t>(last.run.bytes + proto::kAttributesOffset),
                   load_le<std::uint64_t>(last.run.bytes + proto::kAddressesOffset),
-                  chunk_->data + chunk_used_,
+                  chunk_.end(),
                   &lane,
                   &last};
 }
@@ -174,8 +103,8 @@ void Outbox::open_run(LaneQueue& lane, const Limits& limits, std::size_t lane_in
 bool Outbox::push_control(std::span<const std::byte> frame, EgressContext& context,
                           std::uint64_t bytes_most) {
   context.owner.check_here();
-  if (control_bytes_ - first_control_bytes() + frame.size() > bytes_most) return false;
-  put_control(frame, context);
+  if (control_.counted_bytes() + frame.size() > bytes_most) return false;
+  control_.push(copy_control(frame, context));
   return true;
 }
 
@@ -183,18 +112,15 @@ void Outbox::push_first_control(std::span<const std::byte> frames, EgressContext
   context.owner.check_here();
   while (!frames.empty()) {
     const std::size_t size = proto::load_header(frames.data()).frame_size();
-    put_control(frames.first(size), context);
-    lanes().first_control_bytes += static_cast<std::uint32_t>(size);
+    control_.push_uncounted(copy_control(frames.first(size), context));
     frames = frames.subspan(size);
   }
 }
 
-void Outbox::put_control(std::span<const std::byte> frame, EgressContext& context) {
-  Run run{BufferRef{}, frame.data(), static_cast<std::uint32_t>(frame.size()), 1};
-  Run copied = copy(run, context);
-  context.tally.copied_bytes -= run.size;  // that counter is about data
-  control_bytes_ += run.size;
-  if (control_.empty() || !control_.back().extend(copied)) control_.push_back(std::move(copied));
+Run Outbox::copy_control(std::span<const std::byte> frame, EgressContext& context) {
+  context.tally.copied_bytes -= frame.size();  // that counter is about data
+  const auto size = static_cast<std::uint32_t>(frame.size());
+  return copy(Run{BufferRef{}, frame.data(), size, 1}, context);
 }
 
 void Outbox::settle(EgressContext& context) {
@@ -205,8 +131,12 @@ void Outbox::settle(EgressContext& context) {
   lanes_->open.close();
   if (begins) replace_latest(context);
   charge_entries(context);
-  for (std::size_t lane = 0; lane < proto::kLaneCount; ++lane) {
-    settle_lane(lanes_->queues[lane], lanes_->settled[lane], context);
+  for (LaneQueue& lane : lanes_->queues) {
+    lane.settle([&](Entry& entry) {
+      settle_run(entry.run, entry.shared, context);
+      for (MorePieces* more = entry.more.get(); more != nullptr; more = more->next.get())
+        settle_run(more->run, entry.shared, context);
+    });
   }
 }
 
@@ -231,22 +161,6 @@ void Outbox::charge_entries(EgressContext& context) {
   charged = bytes;
 }
 
-void Outbox::settle_lane(LaneQueue& lane, std::uint64_t& settled, EgressContext& context) {
-  RingQueue<Entry>& entries = lane.entries();
-  settled = std::max(settled, entries.first_number());
-  for (; settled < entries.end_number(); ++settled) {
-    Entry& entry = entries.at(settled);
-    if (entry.frames != 0) {
-      settle_run(entry.run, entry.shared, context);
-      for (MorePieces* more = entry.more.get(); more != nullptr; more = more->next.get()) {
-        settle_run(more->run, entry.shared, context);
-      }
-    }
-    // The last entry may grow until the next turn: it is looked at again then.
-    if (settled + 1 == entries.end_number()) break;
-  }
-}
-
 void Outbox::settle_run(Run& run, bool shared, EgressContext& context) {
   const bool by_copy = (run.size < kSettleBytesMax && !shared) || context.budget.scarce();
   if (by_copy && run.buffer->kind != BufferKind::chunk) run = copy(run, context);
@@ -262,8 +176,7 @@ void Outbox::on_emptied(EgressContext& context) {
   backlog_ = false;
   const bool waits = paced_bytes_ != 0 || (resume_ != nullptr && resume_->bytes() != 0);
   if (waits != waits_) note_waiting(context);
-  chunk_.reset();
-  chunk_bytes_ /= kChunkGrowth;
+  chunk_.let_go();
 }
 
 void Outbox::signal_room(EgressContext& context) {
@@ -280,14 +193,8 @@ void Outbox::time_out_block(EgressContext& context) {
   close_run();
   if (!lanes_) return;
   for (LaneQueue& lane : lanes_->queues) {
-    RingQueue<Entry>& entries = lane.entries();
-    for (std::uint64_t number = entries.first_number(); number != entries.end_number(); ++number) {
-      Entry& entry = entries.at(number);
-      if (entry.frames == 0 || !entry.block || entry.touched) continue;
-      lane.on_left(entry, entry.size);
-      lose(entry, proto::DropReason::timed_out, context);
-    }
-    while (!entries.empty() && entries.front().frames == 0) lane.pop_front();
+    lane.lose_all([](const Entry& entry) { return entry.block && !entry.touched; },
+                  [&](Entry& entry) { lose(entry, proto::DropReason::timed_out, context); });
   }
   signal_room(context);
 }
@@ -297,12 +204,8 @@ void Outbox::drop_all(proto::DropReason reason, EgressContext& context) {
   if (lanes_) {
     drop_replay(reason, context);
     for (LaneQueue& lane : lanes_->queues) {
-      while (!lane.empty()) {
-        Entry& entry = lane.entries().front();
-        lane.on_left(entry, entry.size);
-        lose(entry, reason, context);
-        lane.pop_front();
-      }
+      lane.lose_all([](const Entry&) { return true; },
+                    [&](Entry& entry) { lose(entry, reason, context); });
     }
     lanes_->open_messages.clear();
     lanes_->pauses.release_all(context.signals);
@@ -310,64 +213,23 @@ void Outbox::drop_all(proto::DropReason reason, EgressContext& context) {
   on_emptied(context);
 }
 
-void Outbox::set_replay(RingQueue<Run> frames) {
-  Lanes& lanes = this->lanes();
-  lanes.replay = std::move(frames);
-  lanes.replay_bytes = 0;
-  RingQueue<Run>& replay = lanes.replay;
-  for (std::uint64_t number = replay.first_number(); number != replay.end_number(); ++number)
-    lanes.replay_bytes += replay.at(number).size;
-}
-
 void Outbox::drop_replay(proto::DropReason reason, EgressContext& context) {
   if (!lanes_) return;
-  lanes_->replay_bytes = 0;
-  for (RingQueue<Run>& replay = lanes_->replay; !replay.empty(); replay.pop_front()) {
+  RingQueue<Run>& replay = lanes_->replay.runs();
+  for (; !replay.empty(); replay.pop_front()) {
     const Run& run = replay.front();
-    tell_lost(run);
+    if (counted_ != nullptr) counted_->on_run_lost(run);
     count_dropped(run.frames);
     context.tally.queued -= run.frames;
     context.drops.drop_mixed(run.bytes, run.size, reason);
   }
-}
-
-void Outbox::tell_lost(const Entry& entry) const {
-  if (counted_ == nullptr) return;
-  const proto::FrameHeader header = entry.run.header();
-  if (header.kind != proto::Kind::group) return;
-  counted_->on_lost(GroupId{header.dst},
-                    entry.fragmented ? (entry.complete ? 1 : 0) : entry.frames);
-}
-
-void Outbox::tell_lost(const Run& run, const proto::FrameHeader& header) const {
-  if (counted_ == nullptr || header.kind != proto::Kind::group) return;
-  if (header.has(proto::kFlagFragment)) return tell_lost(run);
-  counted_->on_lost(GroupId{header.dst}, run.frames);
-}
-
-void Outbox::tell_lost(const Run& run) const {
-  if (counted_ == nullptr) return;
-  for (Run rest = run.share(); rest.frames != 0; rest.skip_frame()) {
-    const proto::FrameHeader header = rest.header();
-    if (header.kind != proto::Kind::group) continue;
-    const auto frame = proto::parse_frame({rest.bytes, rest.size}, proto::Origin::hub);
-    if (frame && frame->ends_message()) counted_->on_lost(GroupId{header.dst}, 1);
-  }
+  lanes_->replay.clear();
 }
 
 std::uint64_t Outbox::waiting_messages(GroupId group) {
   if (!lanes_) return 0;
   std::uint64_t messages = 0;
-  for (LaneQueue& lane : lanes_->queues) {
-    RingQueue<Entry>& entries = lane.entries();
-    for (std::uint64_t number = entries.first_number(); number != entries.end_number(); ++number) {
-      const Entry& entry = entries.at(number);
-      if (entry.frames == 0) continue;
-      const proto::FrameHeader header = entry.run.header();
-      if (header.kind != proto::Kind::group || header.dst != group.value()) continue;
-      messages += entry.fragmented ? (entry.complete ? 1 : 0) : entry.frames;
-    }
-  }
+  for (LaneQueue& lane : lanes_->queues) messages += lane.messages_of(group);
   return messages;
 }
 
@@ -376,17 +238,161 @@ void Outbox::trim() {
   if (!lanes_) return;
   const bool idle = std::ranges::all_of(lanes_->queues, &LaneQueue::empty) &&
                     lanes_->replay.empty() && lanes_->pauses.empty() &&
-                    lanes_->open_messages.empty() && lanes_->first_control_bytes == 0 &&
-                    !backlog_ && !has_untold_losses_;
+                    lanes_->open_messages.empty() && !backlog_ && !has_untold_losses_;
   if (idle) return lanes_.reset();
   lanes_->replay.trim();
   for (LaneQueue& queue : lanes_->queues) queue.trim();
 }
 
-void Outbox::clear_control() {
-  control_.clear();
-  control_bytes_ = 0;
-  if (lanes_) lanes_->first_control_bytes = 0;
+// The policies of docs/protocol.md, section 5, for a message that finds others waiting.
+
+bool Outbox::join_message(Entry& entry, const proto::FrameHeader& header, EgressContext& context) {
+  const std::size_t lane_index = header.lane & proto::kLaneMask;
+  LaneQueue& lane = lanes_->queues[lane_index];
+  Entry* message = lane.find_message(NodeId{header.src}, entry.message_number);
+  if (message == nullptr) return false;
+  // Of a message that is begun nothing is dropped or replaced any more: its frames wait in the
+  // order in which they came, or a large one to a slow reader would hold up everybody else in its
+  // lane until it ends.
+  if (message->touched && message != &lane.entries().back()) return false;
+  if (backlog_ && memory_refuses(entry, context)) {
+    lose_for_room(entry, lane_index, proto::DropReason::over_budget, context);
+    return true;
+  }
+  if (entry.block && finds_no_room(entry, lane_index, context) &&
+      !ask_to_pause(entry, header, context)) {
+    lose_for_room(entry, lane_index, proto::DropReason::queue_full, context);
+    return true;
+  }
+  // The message may have been settled already, and is not looked at again.
+  if (backlog_) settle_run(entry.run, entry.shared, context);
+  lane.append_fragment(*message, std::move(entry.run), entry.complete, context.pieces);
+  return true;
+}
+
+void Outbox::push_in_pieces(const Run& run, const proto::FrameHeader& header, Handover handover,
+                            EgressContext& context) {
+  for (Run rest = run.share(); rest.frames != 0;) {
+    const Leading piece = rest.leading([](const Leading& before, std::uint32_t next) {
+      return before.frames == 0 || before.size + next <= kSharedChunkBytes;
+    });
+    push(rest.take_front(piece), header, handover, context);
+  }
+}
+
+void Outbox::release_written(std::uint64_t bytes, EgressContext& context) {
+  const std::uint64_t wanted = held_bytes() + bytes;
+  const std::uint64_t share = context.budget.share_bytes();
+  if (resume_ != nullptr && wanted > share) resume_->let_go(wanted - share, counted_);
+}
+
+/// Frames that were written go first: a connection that holds loses nothing by it. Then waiting
+/// messages go, of the least urgent lane first, and of none more urgent than the entry's.
+void Outbox::make_share(const Entry& entry, const proto::FrameHeader& header,
+                        EgressContext& context) {
+  if (!over_share(entry.size, context)) return;
+  release_written(entry.size, context);
+  if (entry.block || header.policy() == proto::Policy::drop) return;
+  const std::uint64_t share = context.budget.share_bytes();
+  for (std::size_t lane = proto::kLaneCount; lane-- > (header.lane & proto::kLaneMask);) {
+    while (held_bytes() + entry.size > share &&
+           drop_for_room(lane, proto::DropReason::over_budget, context))
+      continue;
+  }
+}
+
+void Outbox::admit(Entry entry, const proto::FrameHeader& header, EgressContext& context) {
+  const std::size_t lane_index = header.lane & proto::kLaneMask;
+  LaneQueue& lane = lanes_->queues[lane_index];
+  if (entry.latest && !entry.touched) {
+    Entry older;
+    // It takes a place that may have been settled already, and is not looked at again.
+    if (backlog_) settle_run(entry.run, entry.shared, context);
+    if (lane.replace_latest(entry, older)) return lose(older, proto::DropReason::replaced, context);
+  }
+  if (memory_refuses(entry, context))
+    return lose_for_room(entry, lane_index, proto::DropReason::over_budget, context);
+  // At once, or neighbours in the read buffer would become one run.
+  if (backlog_ && context.budget.scarce()) settle_run(entry.run, entry.shared, context);
+  if (finds_no_room(entry, lane_index, context)) {
+    if (!entry.block && !entry.touched) return admit_to_full(std::move(entry), header, context);
+    if (entry.block && !ask_to_pause(entry, header, context))
+      return lose_for_room(entry, lane_index, proto::DropReason::queue_full, context);
+  }
+  lane.push(std::move(entry));
+}
+
+void Outbox::admit_to_full(Entry entry, const proto::FrameHeader& header, EgressContext& context) {
+  const std::size_t lane_index = header.lane & proto::kLaneMask;
+  LaneQueue& lane = lanes_->queues[lane_index];
+  LaneQueue::note_source(entry);
+  // The new entry counts while a source is looked for that loses. One that is refused did not wait,
+  // and so does not count in who filled the lane.
+  const std::uint32_t size = entry.size;
+  lane.sources().add(entry.source, size);
+  if (header.policy() != proto::Policy::drop) make_room(entry, lane_index, context);
+  lane.sources().take(entry.source, size);
+  if (has_room(size, lane_index, context.limits)) return lane.push(std::move(entry));
+  lose_for_room(entry, lane_index, proto::DropReason::queue_full, context);
+}
+
+bool Outbox::ask_to_pause(const Entry& entry, const proto::FrameHeader& header,
+                          EgressContext& context) {
+  const std::size_t lane = header.lane & proto::kLaneMask;
+  const Limits& limits = context.limits;
+  const auto beyond = [](std::uint64_t bytes, std::uint64_t limit) {
+    return bytes - std::min(bytes, limit);
+  };
+  PauseBook::Excess excess{
+      beyond(lanes_->queues[lane].block_bytes() + entry.size, limits.lane_bytes(lane) / 2),
+      limits.reserve_bytes};
+  if (backlog_ && context.budget.scarce()) {
+    const std::uint64_t share = context.budget.share_bytes();
+    excess.bytes = std::max(excess.bytes, beyond(held_bytes() + entry.size, share));
+    excess.reserve = std::min(excess.reserve, share);
+  }
+  return lanes_->pauses.ask(header, entry.size, excess, context);
+}
+
+/// Drops waiting entries until the new one fits, each of the source that has the most bytes. Where
+/// that is the new one's, and no other entry of it waits, the new one goes.
+void Outbox::make_room(const Entry& entry, std::size_t lane_index, EgressContext& context) {
+  LaneQueue& lane = lanes_->queues[lane_index];
+  // Behind much of BLOCK the oldest messages would always be dropped before their turn came.
+  const bool new_goes = lane.block_bytes() > context.limits.lane_bytes(lane_index) / 4;
+  while (!fits(entry, lane_index, context.limits)) {
+    const bool own = lane.sources().loser() == entry.source;
+    if (own && (new_goes || lane.sources().droppable(entry.source) == entry.size)) return;
+    if (!drop_for_room(lane_index, proto::DropReason::queue_full, context)) return;
+  }
+}
+
+bool Outbox::drop_for_room(std::size_t lane_index, proto::DropReason reason,
+                           EgressContext& context) {
+  Entry older;
+  if (!lanes_->queues[lane_index].drop_oldest(older)) return false;
+  lose_for_room(older, lane_index, reason, context);
+  return true;
+}
+
+void Outbox::lose_for_room(Entry& lost, std::size_t lane_index, proto::DropReason reason,
+                           EgressContext& context) {
+  if (lost.frames == 0) return;
+  has_untold_losses_ = true;
+  lanes_->losses.add(lost, lanes_->queues[lane_index], reason);
+  lose(lost, reason, context);
+}
+
+void Outbox::lose(Entry& entry, proto::DropReason reason, EgressContext& context) {
+  if (entry.frames == 0) return;
+  if (entry.fragmented && !entry.complete) lanes_->open_messages.forget(entry);
+  if (counted_ != nullptr) counted_->on_entry_lost(entry);
+  count_dropped(entry.frames);
+  context.tally.queued -= entry.frames;
+  do {
+    if (entry.run.frames != 0) context.drops.drop(entry.run.bytes, entry.run.frames, reason);
+  } while (entry.next_piece());
+  entry.size = entry.frames = 0;
 }
 
 }  // namespace gimnet::hub

@@ -4,17 +4,18 @@
 #include <array>
 #include <cstdint>
 #include <memory>
-#include <vector>
 
+#include "hub/data/egress/copy_chunk.hpp"
 #include "hub/data/egress/counted_groups.hpp"
 #include "hub/data/egress/egress_context.hpp"
 #include "hub/data/egress/lane_queue.hpp"
+#include "hub/data/egress/open_messages.hpp"
 #include "hub/data/egress/open_run.hpp"
 #include "hub/data/egress/pause_book.hpp"
 #include "hub/data/egress/resume_buffer.hpp"
+#include "hub/data/egress/run_queue.hpp"
 #include "hub/observe/session_gauges.hpp"
 #include "proto/frame/flow.hpp"
-#include "proto/frame/fragment_stream.hpp"
 
 namespace gimnet::hub {
 
@@ -65,7 +66,7 @@ class Outbox {
                                                 std::uint32_t count) {
     if (!lanes_ || !lanes_->open.takes(frames, size) || size >= kAppendBytesMax) return false;
     lanes_->open.append(frames, size, count);
-    chunk_used_ += size;
+    chunk_.take(size);
     return true;
   }
   /// Nothing is appended before the next push().
@@ -137,7 +138,9 @@ class Outbox {
   /// Messages of that group of which the end still waits in a lane.
   [[nodiscard]] std::uint64_t waiting_messages(GroupId group);
   /// Frames that were for this connection did not get here. REQUIRES: as push().
-  void tell_lost(const Run& run, const proto::FrameHeader& header) const;
+  void tell_lost(const Run& run, const proto::FrameHeader& header) const {
+    if (counted_ != nullptr) counted_->on_run_lost(run, header);
+  }
 
   /// Frames were dropped because a lane was full, and the node was not told yet.
   [[nodiscard]] bool has_untold_losses() const { return has_untold_losses_; }
@@ -149,8 +152,7 @@ class Outbox {
   }
 
   /// Frames of an earlier connection, to be written again before all lanes.
-  [[nodiscard]] RingQueue<Run>& replay() { return lanes().replay; }
-  void set_replay(RingQueue<Run> frames);
+  [[nodiscard]] RunQueue& replay() { return lanes().replay; }
   /// They will not be written again.
   void drop_replay(proto::DropReason reason, EgressContext& context);
 
@@ -158,7 +160,9 @@ class Outbox {
   [[nodiscard]] std::uint64_t waiting_bytes() const;
   /// Bytes of messages that are not LATEST: what makes a consumer slow.
   [[nodiscard]] std::uint64_t stale_bytes() const;
-  [[nodiscard]] bool has_block() const;
+  [[nodiscard]] bool has_block() const {
+    return lanes_ && std::ranges::any_of(lanes_->queues, &LaneQueue::block_bytes);
+  }
   [[nodiscard]] bool paused_anyone() const { return lanes_ && !lanes_->pauses.empty(); }
 
   /// After a flush that left something: what stays is counted against the budget, small frames are
@@ -177,13 +181,13 @@ class Outbox {
   /// The session is over, or its connection and nothing may wait: all lanes go.
   void drop_all(proto::DropReason reason, EgressContext& context);
   /// The connection is gone: control frames that wait mean nothing to the next one.
-  void clear_control();
+  void clear_control() { control_.clear(); }
 
   /// Nothing was written for a while: gives back memory that only a busy connection needs.
   void trim();
 
   // For the gather writer, which takes entries out
-  [[nodiscard]] RingQueue<Run>& control() { return control_; }
+  [[nodiscard]] RunQueue& control() { return control_; }
   /// Has it had anything but control frames? Not since it was idle for a while.
   [[nodiscard]] bool has_lanes() const { return lanes_ != nullptr; }
   [[nodiscard]] LaneQueue& lane(std::size_t lane) {
@@ -191,43 +195,21 @@ class Outbox {
     return lanes_->queues[lane];
   }
   [[nodiscard]] std::array<std::uint64_t, proto::kLaneCount>& owed() { return lanes().owed; }
-  void on_control_left(std::uint32_t bytes) {
-    control_bytes_ -= bytes;
-    if (lanes_) lanes_->first_control_bytes -= std::min(bytes, lanes_->first_control_bytes);
-  }
-  void on_replay_left(std::uint32_t bytes) { lanes_->replay_bytes -= bytes; }
   void lose(Entry& entry, proto::DropReason reason, EgressContext& context);
 
  private:
-  /// A message in fragments, of which the beginning was taken and the end has not come.
-  struct OpenMessage {
-    proto::FragmentStream stream;
-    std::uint32_t number = 0;
-  };
   /// The part that only data frames need.
   struct Lanes {
     OpenRun open;  ///< first, with all that append() looks at
     std::array<LaneQueue, proto::kLaneCount> queues;
     std::array<std::uint64_t, proto::kLaneCount>
-        settled{};  ///< entries below this number are settled
-    std::array<std::uint64_t, proto::kLaneCount>
         owed{};  ///< bytes due to a waiting lane, see GatherWriter
-    RingQueue<Run> replay;
-    std::uint64_t replay_bytes = 0;
+    RunQueue replay;
     std::uint64_t charged_bytes = 0;  ///< of the queues' entries, counted against the budget
     PauseBook pauses;
     UntoldLosses losses;
-    std::vector<OpenMessage> open_messages;  ///< one of a stream, the oldest first
-    std::uint32_t first_control_bytes =
-        0;  ///< of push_first_control() that have not left; here, since few ever have any
+    OpenMessages open_messages;
   };
-  /// Messages in fragments that may be under way to one connection at a time. Beyond it the source
-  /// with most of them loses the oldest: a sender that never ends its messages takes no place of
-  /// others.
-  static constexpr std::size_t kOpenMessagesMax = 256;
-  /// A sender that is held may still be read, because its own CONFIRM is waited for, and it may
-  /// ignore PAUSE. Beyond so many reserves its messages are dropped, with or without BLOCK.
-  static constexpr std::uint64_t kReservesMax = 8;
   /// A waiting piece below this is copied out of its slab, which it would keep from being used
   /// again.
   static constexpr std::uint32_t kSettleBytesMax = kSharedChunkBytes;
@@ -242,10 +224,9 @@ class Outbox {
   [[nodiscard]] Entry make_entry(const Run& run, const proto::FrameHeader& header,
                                  Handover handover, bool has_room, EgressContext& context);
   [[nodiscard]] Run copy(const Run& run, EgressContext& context);
-  [[nodiscard]] static Run copy_alone(const Run& run, EgressContext& context);
-  /// Bytes that still fit: of messages sent with BLOCK into half of the lane, of others into what
-  /// those leave, at least the other half.
-  [[nodiscard]] std::uint64_t room(std::size_t lane, bool block, const Limits& limits) const;
+  [[nodiscard]] std::uint64_t room(std::size_t lane, bool block, const Limits& limits) const {
+    return lanes_->queues[lane].room(block, limits.lane_bytes(lane));
+  }
   /// Does so much fit in the lane, whatever of it is sent with BLOCK?
   [[nodiscard]] static bool surely_fits(std::uint64_t bytes, std::size_t lane,
                                         const Limits& limits) {
@@ -267,6 +248,11 @@ class Outbox {
     return context.budget.exhausted() ||
            (backlog_ && !entry.block && over_share(entry.size, context));
   }
+  /// Has neither its lane nor, while memory is scarce, the connection's share room for it?
+  [[nodiscard]] bool finds_no_room(const Entry& entry, std::size_t lane,
+                                   EgressContext& context) const {
+    return !fits(entry, lane, context.limits) || (backlog_ && over_share(entry.size, context));
+  }
   void admit(Entry entry, const proto::FrameHeader& header, EgressContext& context);
   void admit_to_full(Entry entry, const proto::FrameHeader& header, EgressContext& context);
   void make_room(const Entry& entry, std::size_t lane_index, EgressContext& context);
@@ -279,35 +265,25 @@ class Outbox {
                                   EgressContext& context);
   [[nodiscard]] bool join_message(Entry& entry, const proto::FrameHeader& header,
                                   EgressContext& context);
-  /// Takes note of where a fragment stands in its message. Returns whether it may go on: no rest of
-  /// a message of which the beginning did not come or was dropped.
-  [[nodiscard]] bool follow_message(const Entry& entry, EgressContext& context);
-  [[nodiscard]] std::vector<OpenMessage>::iterator find_open(const proto::FragmentStream& stream);
-  void open_message(const OpenMessage& message);
-  void put_control(std::span<const std::byte> frame, EgressContext& context);
-  [[nodiscard]] std::uint32_t first_control_bytes() const {
-    return lanes_ ? lanes_->first_control_bytes : 0;
-  }
-  void tell_lost(const Entry& entry) const;
-  /// Frames of any headers.
-  void tell_lost(const Run& run) const;
+  [[nodiscard]] Run copy_control(std::span<const std::byte> frame, EgressContext& context);
   void replace_latest(EgressContext& context);
   /// Many small messages that cannot form runs take more memory for their entries than for their
   /// bytes.
   void charge_entries(EgressContext& context);
-  void settle_lane(LaneQueue& lane, std::uint64_t& settled, EgressContext& context);
-  [[nodiscard]] std::uint64_t data_bytes() const;
+  [[nodiscard]] std::uint64_t data_bytes() const {
+    std::uint64_t bytes = 0;
+    if (lanes_)
+      for (const LaneQueue& queue : lanes_->queues) bytes += queue.bytes();
+    return bytes;
+  }
 
-  RingQueue<Run> control_;
+  RunQueue control_;
   std::unique_ptr<Lanes> lanes_;  ///< nullptr: no data since it was made or trimmed
   CountedGroups* counted_ = nullptr;
   SessionCounters* counters_ = nullptr;
   ResumeBuffer* resume_ = nullptr;
   std::uint64_t paced_bytes_ = 0;
-  BufferRef chunk_;  ///< where copies go
-  std::uint32_t chunk_used_ = 0;
-  std::uint32_t chunk_bytes_ = 0;  ///< size of the next chunk
-  std::uint32_t control_bytes_ = 0;
+  CopyChunk chunk_;  ///< where copies go
   bool backlog_ = false;
   bool waits_ = false;  ///< counted among the connections that have data waiting
   bool has_untold_losses_ = false;

@@ -4,6 +4,26 @@
 
 namespace gimnet::hub {
 
+bool PauseBook::ask(const proto::FrameHeader& header, std::uint32_t bytes, const Excess& excess,
+                    EgressContext& context) {
+  const NodeId sender{header.src};
+  const auto lane = static_cast<proto::Lane>(header.lane & proto::kLaneMask);
+  // A link is always read, so nobody behind it can be held; and it may name any source.
+  const bool afar = hub_of(sender) != context.hub;
+  std::uint64_t since_held = 0;
+  if (!afar || notes_.size() < kPausedAfarMost) {
+    since_held = on_full(sender, {header.kind, lane, header.dst}, bytes,
+                         excess.bytes > excess.reserve, context.signals);
+  }
+  // Many senders may come at once: each is held, and loses nothing. What one of them had under way
+  // by then was in its shard's mailbox to this one, or came with the reads before its shard heard
+  // of the hold.
+  const std::uint64_t reserves = kReservesMax * excess.reserve;
+  const Limits& limits = context.limits;
+  const bool comes_though_held = since_held > limits.mailbox_bytes + limits.turn_bytes + reserves;
+  return (!comes_though_held && !afar) || excess.bytes <= reserves;
+}
+
 std::uint64_t PauseBook::on_full(NodeId sender, const proto::flow::Target& target,
                                  std::uint32_t bytes, bool past_reserve, SenderSignals& signals) {
   auto note = std::find_if(notes_.begin(), notes_.end(), [&](const Note& each) {

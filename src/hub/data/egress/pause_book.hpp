@@ -15,6 +15,15 @@ class PauseBook {
   [[nodiscard]] bool empty() const { return notes_.empty(); }
   [[nodiscard]] std::size_t size() const { return notes_.size(); }
 
+  /// The bytes with BLOCK that are beyond a limit, and how many may be before senders are held.
+  struct Excess {
+    std::uint64_t bytes = 0;
+    std::uint64_t reserve = 0;
+  };
+  /// A frame with BLOCK came although its lane is full: asks its sender to pause. Returns false if
+  /// it came all the same, although it was held: the frame is not to be taken.
+  [[nodiscard]] bool ask(const proto::FrameHeader& header, std::uint32_t bytes,
+                         const Excess& excess, EgressContext& context);
   /// A frame with BLOCK of `bytes` came although its lane is full. Returns the bytes that came from
   /// its sender for that target since it was held, this frame included; 0: it is not held.
   std::uint64_t on_full(NodeId sender, const proto::flow::Target& target, std::uint32_t bytes,
@@ -35,6 +44,13 @@ class PauseBook {
   /// A sender that still sends after so many bytes has not seen PAUSE, or lost it with a
   /// connection: told again.
   static constexpr std::uint32_t kRemindBytes = 256 * 1024;
+
+  /// A sender that is held may still be read, because its own CONFIRM is waited for, and it may
+  /// ignore PAUSE. Beyond so many reserves its messages are dropped, with or without BLOCK.
+  static constexpr std::uint64_t kReservesMax = 8;
+  /// Senders of other hubs that one outbox pauses. More of them are dropped once the reserves are
+  /// used up.
+  static constexpr std::size_t kPausedAfarMost = 4'096;
 
   static void let_go(Note& note, SenderSignals& signals);
 

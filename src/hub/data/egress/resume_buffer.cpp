@@ -44,7 +44,7 @@ std::uint64_t ResumeBuffer::confirm(std::uint64_t count) {
   return count > counted ? count - counted : 0;
 }
 
-ResumeBuffer::Rewind ResumeBuffer::rewind(std::uint64_t count, RingQueue<Run>& replay) {
+ResumeBuffer::Rewind ResumeBuffer::rewind(std::uint64_t count, RunQueue& replay) {
   Rewind result;
   if (count > written_ || count < confirmed_) return result;
   result.possible = true;
@@ -56,7 +56,7 @@ ResumeBuffer::Rewind ResumeBuffer::rewind(std::uint64_t count, RingQueue<Run>& r
   result.lost = first - std::max(count, std::min(lost_below_, first));
   lost_below_ = std::max(lost_below_, first);
   while (!kept_.empty()) {
-    replay.push_back(std::move(kept_.front()));
+    replay.push(std::move(kept_.front()));
     kept_.pop_front();
   }
   written_ -= kept_frames_;

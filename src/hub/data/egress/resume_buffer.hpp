@@ -6,6 +6,7 @@
 
 #include "hub/data/egress/counted_groups.hpp"
 #include "hub/data/egress/entry.hpp"
+#include "hub/data/egress/run_queue.hpp"
 #include "hub/data/ring_queue.hpp"
 
 namespace gimnet::hub {
@@ -40,7 +41,7 @@ class ResumeBuffer {
   };
   /// After a break the peer says it took `count`: what it did not take moves to `replay`, to be
   /// written again first.
-  [[nodiscard]] Rewind rewind(std::uint64_t count, RingQueue<Run>& replay);
+  [[nodiscard]] Rewind rewind(std::uint64_t count, RunQueue& replay);
 
   /// Gives back memory that only a busy connection needs.
   void trim() { kept_.trim(); }

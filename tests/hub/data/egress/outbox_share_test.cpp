@@ -299,10 +299,10 @@ TEST_F(OutboxShare, WaitingConnectionsAreCounted) {
 }
 
 TEST_F(OutboxShare, WhatIsToBeWrittenAgainCounts) {
-  RingQueue<Frames> again;
-  again.push_back(rig.run({sized(100), sized(100)}));
+  RunQueue again;
+  again.push(rig.run({sized(100), sized(100)}));
   rig.tally.queued += 2;
-  connection.outbox.set_replay(std::move(again));
+  connection.outbox.replay() = std::move(again);
   EXPECT_EQ(connection.outbox.held_bytes(), 200u);
   connection.peer.set_room(150);
   EXPECT_EQ(connection.flush(), Flush::blocked);

@@ -19,7 +19,7 @@ class ResumeBufferTest : public ::testing::Test {
   }
   EgressRig rig;
   ResumeBuffer buffer{1'000};
-  RingQueue<hub::Run> replay;
+  hub::RunQueue replay;
 };
 
 TEST_F(ResumeBufferTest, ConfirmsAtAnyFrame) {
@@ -80,7 +80,7 @@ TEST_F(ResumeBufferTest, LetsAsManyBytesGoAsItMust) {
 TEST_F(ResumeBufferTest, RewindsToEveryCount) {
   for (std::uint64_t count = 0; count <= 5; ++count) {
     ResumeBuffer fresh(1'000);
-    RingQueue<hub::Run> again;
+    hub::RunQueue again;
     fresh.wrote(frames(3));
     fresh.wrote(frames(2, kDrop));
     const auto rewind = fresh.rewind(count, again);
@@ -88,7 +88,7 @@ TEST_F(ResumeBufferTest, RewindsToEveryCount) {
     EXPECT_EQ(rewind.confirmed, count);
     EXPECT_EQ(rewind.gap, 0u);
     std::uint64_t waiting = 0;
-    for (; !again.empty(); again.pop_front()) waiting += again.front().frames;
+    for (; !again.empty(); again.runs().pop_front()) waiting += again.runs().front().frames;
     EXPECT_EQ(waiting, 5 - count);
     EXPECT_EQ(fresh.written(), count);
   }
@@ -111,14 +111,14 @@ TEST_F(ResumeBufferTest, TellsTheGapUntilItWasHeardAndTheLossOnce) {
   EXPECT_EQ(rewind.gap, 2u);
   EXPECT_EQ(rewind.lost, 2u);
   // The SKIP was lost: the peer still counts 1.
-  for (; !replay.empty(); replay.pop_front()) buffer.wrote(replay.front().share());
+  for (; !replay.empty(); replay.runs().pop_front()) buffer.wrote(replay.runs().front().share());
   rewind = buffer.rewind(1, replay);
   EXPECT_TRUE(rewind.possible);
   EXPECT_EQ(rewind.gap, 2u);
   EXPECT_EQ(rewind.lost, 0u);
   EXPECT_EQ(rewind.confirmed, 0u);
   // Now it came: 3, and then all the rest.
-  for (; !replay.empty(); replay.pop_front()) buffer.wrote(replay.front().share());
+  for (; !replay.empty(); replay.runs().pop_front()) buffer.wrote(replay.runs().front().share());
   EXPECT_EQ(buffer.unconfirmed(), 7u);
   EXPECT_EQ(buffer.confirm(10), 7u);
 }

@@ -1,9 +1,9 @@
+#include "hub/data/egress/open_messages.hpp"
+
 #include <gtest/gtest.h>
 
 #include "hub/data/egress/outbox.hpp"
 #include "tests/hub/data/support/egress_rig.hpp"
-
-// Of which messages in fragments an outbox takes the rest.
 
 namespace gimnet::hub {
 namespace {
@@ -14,7 +14,7 @@ using testing::EgressRig;
 using testing::TestConnection;
 using testing::TestFrame;
 
-TEST(OutboxFragments, ABeginningEndsTheMessageBeforeItInItsStream) {
+TEST(OpenMessages, ABeginningEndsTheMessageBeforeItInItsStream) {
   EgressRig rig;
   TestConnection connection(rig);
   const auto begin = [&](std::uint32_t number, TestFrame frame) {
@@ -40,7 +40,7 @@ TEST(OutboxFragments, ABeginningEndsTheMessageBeforeItInItsStream) {
   EXPECT_TRUE(rig.ledger_exact());
 }
 
-TEST(OutboxFragments, ASenderOfBeginningsLosesNoMessageOfOthers) {
+TEST(OpenMessages, ASenderOfBeginningsLosesNoMessageOfOthers) {
   for (const std::uint32_t begun : {255u, 256u}) {
     EgressRig rig;
     TestConnection connection(rig);

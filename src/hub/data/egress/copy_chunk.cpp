@@ -1,0 +1,40 @@
+#include "hub/data/egress/copy_chunk.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <utility>
+
+namespace gimnet::hub {
+namespace {
+
+Run copy_alone(const Run& run, EgressContext& context) {
+  BufferRef chunk = context.pool.take_exact(run.size);
+  std::memcpy(chunk->data, run.bytes, run.size);
+  context.tally.copied_bytes += run.size;
+  const std::byte* const bytes = chunk->data;
+  return Run{std::move(chunk), bytes, run.size, run.frames};
+}
+
+}  // namespace
+
+Run CopyChunk::copy(const Run& run, bool waits, EgressContext& context) {
+  if (context.budget.scarce() && run.size >= BufferPool::kExactBytesMin)
+    return copy_alone(run, context);
+  if (!chunk_ || chunk_->capacity - used_ < run.size) {
+    // A large one saves entries and calls where there is room; where there is little, each outbox
+    // takes what it must.
+    const bool little = context.budget.scarce() || context.budget.exhausted();
+    next_bytes_ = little ? 0 : std::clamp(kGrowth * next_bytes_, kFirstBytes, kSharedChunkBytes);
+    chunk_ = context.pool.take_chunk(std::max(run.size, next_bytes_));
+    used_ = 0;
+    // At once where something waits: by the end of the turn many outboxes may have begun one.
+    if (waits) context.pool.pin(*chunk_.get());
+  }
+  std::byte* place = chunk_->data + used_;
+  std::memcpy(place, run.bytes, run.size);
+  used_ += run.size;
+  context.tally.copied_bytes += run.size;
+  return Run{chunk_.share(), place, run.size, run.frames};
+}
+
+}  // namespace gimnet::hub
