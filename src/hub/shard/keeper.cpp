@@ -15,11 +15,14 @@ void Keeper::tick() {
   next_tick_at_ms_ = state_.now_ms + kTickMs;
   state_.pool.take_back_lent();
   if (state_.budget.scarce()) state_.pool.free_kept();
+  const bool says_again = state_.now_ms >= say_again_at_ms_;
+  if (says_again) say_again_at_ms_ = state_.now_ms + kSayAgainMs;
   for (const std::unique_ptr<Connection>& connection : state_.connections) {
     if (connection == nullptr) continue;
     // Those who were paused for a share may go on once memory is not scarce; of an absent
     // connection nothing else tells them.
     connection->outbox.signal_room(state_.egress);
+    if (says_again) connection->outbox.say_pauses_again(state_.egress);
     if (!connection->connected) continue;
     if (late_ms > kTickMs) forgive(*connection, late_ms);
     look_at(*connection);

@@ -17,6 +17,8 @@ class Keeper {
 
   /// Between two looks at all connections.
   static constexpr std::uint64_t kTickMs = 100;
+  /// Twice within the time for which a sender heeds PAUSE of another hub.
+  static constexpr std::uint64_t kSayAgainMs = 500;
 
   /// Looks at all connections, if a tick has passed.
   void tick();
@@ -48,6 +50,7 @@ class Keeper {
   Flusher& flusher_;
   ConnectionReader& reader_;
   std::uint64_t next_tick_at_ms_ = 0;
+  std::uint64_t say_again_at_ms_ = 0;
   std::uint64_t drain_deadline_ms_ = 0;
   bool draining_ = false;
   bool drained_told_ = false;

@@ -23,6 +23,9 @@ Flow::Flow(const WirePlan& way, hub::MemoryPeer from, bool opens)
 }
 
 void Flow::take(Random& random, milliseconds now, const Tap& tap) {
+  // The kernel keeps what waits unsent below that.
+  const std::size_t most_unsent = from_.unsent_limit();
+  from_.set_room(most_unsent == 0 ? kRoom : std::min(kRoom, most_unsent));
   if (way_.bytes_per_ms != 0)
     allowed_ = std::min(allowed_ + way_.bytes_per_ms, kBurstMs * way_.bytes_per_ms);
   if (from_.readable() != 0) {

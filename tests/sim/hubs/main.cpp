@@ -8,13 +8,15 @@
 
 int main(int count, char** texts) {
   using namespace gimnet::sim;
-  const Simulation simulation{"gimnet-sim-hubs",
-                              hubs::kCheckerNames,
-                              hubs::kEventNames,
-                              400,
-                              2'000,
-                              {"--large", "--scenes", "--long", "--trace"}};
+  Simulation simulation{"gimnet-sim-hubs",
+                        hubs::kCheckerNames,
+                        hubs::kEventNames,
+                        400,
+                        2'000,
+                        {"--large", "--scenes", "--long", "--trace"}};
   Arguments arguments = read_arguments(simulation, count, texts);
+  // Large worlds have more of everything.
+  if (arguments.has("--large")) simulation.seeds_for_all = 100;
   const std::span<const hubs::Scene> scenes = hubs::scenes();
   const bool plays = arguments.has("--scenes");
   // The scenes are numbered from 1 on.

@@ -8,6 +8,8 @@ namespace {
 
 constexpr std::int64_t kNow = 1'700'000'000'000'000'000;
 constexpr std::uint32_t kGigabit = 125'000;  ///< bytes a ms
+constexpr std::uint32_t kRingRate = 50;      ///< bytes a ms of each link of a ring that is full
+constexpr std::uint64_t kRingBytes = 2'000;  ///< of each frame there
 constexpr std::uint64_t kFaultsMost = 8;     ///< so many restarts, for the bounds
 constexpr std::uint64_t kStartMs = 2'500;    ///< until all hubs run and are linked
 
@@ -51,9 +53,9 @@ Plan chain(std::size_t hubs, std::uint64_t delay_ms = 1, std::uint32_t bytes_per
   return plan;
 }
 
-Plan ring(std::size_t hubs) {
-  Plan plan = chain(hubs);
-  wire(plan, hubs - 1, 0);
+Plan ring(std::size_t hubs, std::uint64_t delay_ms = 1, std::uint32_t bytes_per_ms = 0) {
+  Plan plan = chain(hubs, delay_ms, bytes_per_ms);
+  wire(plan, hubs - 1, 0, delay_ms, bytes_per_ms);
   return plan;
 }
 
@@ -94,11 +96,6 @@ void all_arrive(Stage& stage, std::uint64_t within_ms) {
 }
 
 // Sizes and ways
-
-void play_star(Stage& stage) {
-  stage.run(kStartMs);
-  stage.reset(7);
-}
 
 void play_wan(Stage& stage) {
   stage.run(kStartMs);
@@ -356,8 +353,28 @@ void play_slow_node(Stage& stage) {
   all_arrive(stage, 60'000);
 }
 
+/// Each node sends to the one opposite. Two of the four links carry frames of their own node and of
+/// another one, which have to take turns.
+void play_block_ring(Stage& stage) {
+  // Longer than what lies in two full lanes takes.
+  constexpr std::uint64_t kLookMs = 60'000;
+  const std::uint64_t looks = stage.is_long() ? 60 : 5;
+  const auto opposite = [](std::size_t from) { return (from + 2) % 4; };
+  stage.run(kStartMs);
+  for (std::uint64_t look = 0; look < looks; ++look) {
+    std::vector<std::uint64_t> before;
+    for (std::size_t to = 0; to < stage.nodes(); ++to) before.push_back(stage.node(to).taken());
+    flood(stage, kLookMs, kRingBytes, opposite);
+    for (std::size_t to = 0; to < stage.nodes(); ++to)
+      Stage::need((stage.node(to).taken() - before[to]) * kRingBytes * 4 > kLookMs * kRingRate,
+                  Checker::resumes, "a sender does not get a quarter of its link");
+  }
+  all_arrive(stage, 60'000);
+}
+
 constexpr Scene kScenes[] = {
-    {"star_of_200", [] { return star(200); }, play_star, true},
+    {"star_of_200", [] { return star(200); },
+     [](Stage& stage) { stage.run(kStartMs), stage.reset(7); }, true},
     {"wan_of_100_ms_resumes", [] { return chain(2, 50); }, play_wan},
     {"break_loses_only_control", [] { return chain(3); }, play_control_only},
     {"two_copies_of_a_state_folder", [] { return collision(true); }, play_collision},
@@ -373,6 +390,7 @@ constexpr Scene kScenes[] = {
     {"move_past_an_older_claim", plan_older_claim, play_older_claim},
     {"halves_with_100_names", plan_halves, play_halves},
     {"three_block_to_a_slow_node", plan_slow_node, play_slow_node},
+    {"ring_of_four_with_block", [] { return ring(4, 5, kRingRate); }, play_block_ring},
 };
 
 }  // namespace

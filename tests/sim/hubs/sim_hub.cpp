@@ -53,8 +53,10 @@ hub::Conductor::Wiring SimHub::wiring(Around around) {
 }
 
 void SimHub::step(milliseconds now) {
-  if (stepped_ && now - *stepped_ > hub::Conductor::kLookEvery)
+  if (stepped_ && now - *stepped_ > hub::Conductor::kLookEvery) {
     conductor_.stood_still(now - *stepped_, now);
+    looked_ = false;
+  }
   stepped_ = now;
   if (conductor_.drain_wanted()) drain();
   for (int round = 0; round < kRoundsMost; ++round) {
@@ -91,13 +93,15 @@ bool SimHub::take_events(milliseconds now) {
   bool worked = false;
   for (int i = 0; i < kEventsARound && !turns_.empty(); ++i, worked = true)
     conductor_.on_event(turns_.take(), now);
-  const auto due = conductor_.next_deadline();
+  // A hub with many neighbours looks at all of them to find its next deadline.
+  if (worked || !looked_) due_ = conductor_.next_deadline();
   const bool collects = conductor_.has_garbage() && now % kCollectEvery == milliseconds{0};
-  if ((due && *due <= now) || collects) {
+  if ((due_ && *due_ <= now) || collects) {
     conductor_.tick(now);
     worked = true;
   }
-  if (worked || more_to_tell_) more_to_tell_ = conductor_.tell_rest(now);
+  looked_ = !worked && !more_to_tell_;
+  if (!looked_) more_to_tell_ = conductor_.tell_rest(now);
   return door_.sent || !turns_.empty() || more_to_tell_;
 }
 
@@ -111,6 +115,7 @@ std::optional<proto::Goodbye> SimHub::admit(hub::Stranger stranger, hub::MemoryP
   for (hub::ShardEvent& event : turns_.take_ended()) conductor_.on_event(std::move(event), now);
   add_peer(stranger.transport.get(), std::move(peer));
   door_.admitted = {};
+  looked_ = false;
   return conductor_.admit(stranger, hello, {now, wall_now_ns_()});
 }
 
@@ -118,10 +123,12 @@ void SimHub::on_dialled(hub::LinkNumber link, std::unique_ptr<net::Stream> strea
                         hub::MemoryPeer peer, const proto::Welcome& welcome, milliseconds now) {
   add_peer(stream.get(), std::move(peer));
   conductor_.on_dialled(link, net::Welcomed{std::move(stream), welcome}, now);
+  looked_ = false;
 }
 
 void SimHub::on_not_dialled(hub::LinkNumber link, net::NetError error, milliseconds now) {
   conductor_.on_dialled(link, std::move(error), now);
+  looked_ = false;
 }
 
 }  // namespace gimnet::sim::hubs

@@ -58,6 +58,7 @@ class SimHub {
   void on_not_dialled(hub::LinkNumber link, net::NetError error, milliseconds now);
   void drain() {
     drains_ = true;
+    looked_ = false;
     conductor_.drain();
   }
   /// It ends within its time to drain, also where a link does not take what waits.
@@ -119,6 +120,8 @@ class SimHub {
   std::optional<milliseconds> stepped_;  ///< the last time
   milliseconds turn_at_{0};
   bool more_to_tell_ = false;
+  std::optional<milliseconds> due_;  ///< of the conductor, unless something came since
+  bool looked_ = false;              ///< due_ is known
   bool drains_ = false;
 };
 

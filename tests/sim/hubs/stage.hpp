@@ -11,6 +11,8 @@ class Stage {
  public:
   explicit Stage(World& world) : world_(world) {}
 
+  /// It may take longer.
+  [[nodiscard]] bool is_long() const { return world_.options_.is_long; }
   void run(std::uint64_t ms) { world_.run_until(world_.now_ + milliseconds{ms}); }
   /// Until that wire carries a link at both ends. Errors: it does not within 10 s.
   void run_until_up(std::size_t wire);

@@ -183,9 +183,9 @@ void Outbox::signal_room(EgressContext& context) {
   if (!paused_anyone()) return;
   if (context.budget.scarce() && data_bytes() > context.budget.share_bytes() / 2) return;
   for (std::size_t lane = 0; lane < proto::kLaneCount; ++lane) {
-    if (lanes_->queues[lane].block_bytes() <= context.limits.lane_bytes(lane) / 4) {
-      lanes_->pauses.on_room(static_cast<proto::Lane>(lane), context.signals);
-    }
+    if (!lanes_->pauses.pauses(lane)) continue;
+    const auto places = lanes_->queues[lane].places_with_room(context.limits.lane_bytes(lane));
+    lanes_->pauses.on_room(static_cast<proto::Lane>(lane), places, context.signals);
   }
 }
 
@@ -338,15 +338,17 @@ void Outbox::admit_to_full(Entry entry, const proto::FrameHeader& header, Egress
 
 bool Outbox::ask_to_pause(const Entry& entry, const proto::FrameHeader& header,
                           EgressContext& context) {
-  const std::size_t lane = header.lane & proto::kLaneMask;
-  const Limits& limits = context.limits;
+  const std::size_t lane_index = header.lane & proto::kLaneMask;
+  const LaneQueue& lane = lanes_->queues[lane_index];
+  const std::uint64_t lane_bytes = context.limits.lane_bytes(lane_index);
+  const bool scarce = backlog_ && context.budget.scarce();
+  if (!scarce && lane.is_within_share(NodeId{header.src}, entry.size, lane_bytes)) return true;
   const auto beyond = [](std::uint64_t bytes, std::uint64_t limit) {
-    return bytes - std::min(bytes, limit);
+    return std::max(bytes, limit) - limit;
   };
-  PauseBook::Excess excess{
-      beyond(lanes_->queues[lane].block_bytes() + entry.size, limits.lane_bytes(lane) / 2),
-      limits.reserve_bytes};
-  if (backlog_ && context.budget.scarce()) {
+  PauseBook::Excess excess{beyond(lane.block_bytes() + entry.size, lane_bytes / 2),
+                           context.limits.reserve_bytes};
+  if (scarce) {
     const std::uint64_t share = context.budget.share_bytes();
     excess.bytes = std::max(excess.bytes, beyond(held_bytes() + entry.size, share));
     excess.reserve = std::min(excess.reserve, share);

@@ -175,6 +175,10 @@ class Outbox {
   void on_emptied(EgressContext& context);
   /// After frames left: tells paused senders that there is room.
   void signal_room(EgressContext& context);
+  /// Now and then: repeats to senders what they would forget.
+  void say_pauses_again(EgressContext& context) const {
+    if (paused_anyone()) lanes_->pauses.say_again(context.signals);
+  }
 
   /// The recipient took nothing for too long: every message sent with BLOCK goes.
   void time_out_block(EgressContext& context);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "hub/data/egress/source_bytes.hpp"
+
 namespace gimnet::hub {
 
 bool PauseBook::ask(const proto::FrameHeader& header, std::uint32_t bytes, const Excess& excess,
@@ -31,6 +33,7 @@ std::uint64_t PauseBook::on_full(NodeId sender, const proto::flow::Target& targe
   });
   if (note == notes_.end()) {
     note = notes_.insert(notes_.end(), Note{sender, target});
+    places_[static_cast<std::size_t>(target.lane)] |= 1u << SourceBytes::place_of(sender);
     signals.pause(sender, target);
   } else if (note->bytes_since += bytes; note->bytes_since >= kRemindBytes) {
     note->bytes_since = 0;
@@ -44,17 +47,28 @@ std::uint64_t PauseBook::on_full(NodeId sender, const proto::flow::Target& targe
   return note->held_bytes += bytes;
 }
 
-void PauseBook::on_room(proto::Lane lane, SenderSignals& signals) {
+void PauseBook::on_room(proto::Lane lane, std::uint32_t places, SenderSignals& signals) {
+  std::uint32_t& paused = places_[static_cast<std::size_t>(lane)];
+  if ((paused & places) == 0) return;
+  paused &= ~places;
   std::erase_if(notes_, [&](Note& note) {
-    if (note.target.lane != lane) return false;
+    const bool has_room = (places >> SourceBytes::place_of(note.sender) & 1) != 0;
+    if (note.target.lane != lane || !has_room) return false;
     let_go(note, signals);
     return true;
   });
 }
 
+void PauseBook::say_again(SenderSignals& signals) const {
+  for (const Note& note : notes_)
+    if (hub_of(NodeId{note.target.dst}) != hub_of(note.sender))
+      signals.pause(note.sender, note.target);
+}
+
 void PauseBook::release_all(SenderSignals& signals) {
   for (Note& note : notes_) let_go(note, signals);
   notes_.clear();
+  places_ = {};
 }
 
 void PauseBook::let_go(Note& note, SenderSignals& signals) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -28,8 +29,12 @@ class PauseBook {
   /// its sender for that target since it was held, this frame included; 0: it is not held.
   std::uint64_t on_full(NodeId sender, const proto::flow::Target& target, std::uint32_t bytes,
                         bool past_reserve, SenderSignals& signals);
-  /// The lane has room again.
-  void on_room(proto::Lane lane, SenderSignals& signals);
+  /// The lane has room again for the senders at those places of SourceBytes.
+  void on_room(proto::Lane lane, std::uint32_t places, SenderSignals& signals);
+  /// Is anybody paused for that lane?
+  [[nodiscard]] bool pauses(std::size_t lane) const { return places_[lane] != 0; }
+  /// Repeats each PAUSE about another hub than the sender's, which the sender heeds for a second.
+  void say_again(SenderSignals& signals) const;
   /// The outbox is given up.
   void release_all(SenderSignals& signals);
 
@@ -55,6 +60,7 @@ class PauseBook {
   static void let_go(Note& note, SenderSignals& signals);
 
   std::vector<Note> notes_;
+  std::array<std::uint32_t, proto::kLaneCount> places_{};  ///< of those paused for each lane
 };
 
 }  // namespace gimnet::hub

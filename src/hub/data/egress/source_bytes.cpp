@@ -1,6 +1,7 @@
 #include "hub/data/egress/source_bytes.hpp"
 
 #include <algorithm>
+#include <span>
 
 namespace gimnet::hub {
 
@@ -19,6 +20,19 @@ std::uint8_t SourceBytes::fullest() const {
     most_bytes = bytes;
   }
   return most;
+}
+
+std::uint32_t SourceBytes::fixed_sources() const {
+  const auto fixed = std::span(bytes_).subspan(kFixed);
+  return std::max<std::uint32_t>(1, static_cast<std::uint32_t>(std::ranges::count_if(
+                                        fixed, [](std::uint32_t bytes) { return bytes != 0; })));
+}
+
+std::uint32_t SourceBytes::below(std::uint64_t bytes) const {
+  std::uint32_t places = 0;
+  for (std::uint8_t each = 0; each < kSources; ++each)
+    if (fixed(each) <= bytes) places |= 1u << each;
+  return places;
 }
 
 }  // namespace gimnet::hub

@@ -25,6 +25,12 @@ class SourceBytes {
   void add(std::uint8_t place, std::uint32_t bytes) { bytes_[place] += bytes; }
   void take(std::uint8_t place, std::uint32_t bytes) { bytes_[place] -= bytes; }
 
+  /// Bytes that are never dropped for room.
+  [[nodiscard]] std::uint32_t fixed(std::uint8_t place) const { return bytes_[place + kFixed]; }
+  /// So many sources have such bytes, or one if none has.
+  [[nodiscard]] std::uint32_t fixed_sources() const;
+  /// Those that have at most so many of them, as bits of their places.
+  [[nodiscard]] std::uint32_t below(std::uint64_t bytes) const;
   /// Bytes that may be dropped for room.
   [[nodiscard]] std::uint32_t droppable(std::uint8_t place) const { return bytes_[place]; }
   /// The place of the source that loses a message when the lane is full: that with the most bytes

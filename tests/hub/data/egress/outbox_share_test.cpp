@@ -4,7 +4,7 @@
 #include "hub/data/egress/outbox.hpp"
 #include "tests/hub/data/support/egress_rig.hpp"
 
-// While memory is scarce each connection has a share of it.
+// While memory is scarce each connection has a share of it. The senders of a full lane share that.
 
 namespace gimnet::hub {
 namespace {
@@ -309,6 +309,35 @@ TEST_F(OutboxShare, WhatIsToBeWrittenAgainCounts) {
   EXPECT_EQ(connection.outbox.held_bytes(), 0u) << "one is written, one is begun";
   connection.peer.set_room(MemoryPeer::kAll);
   EXPECT_EQ(connection.flush(), Flush::emptied);
+}
+
+// Two senders share the half of the lane, 8 KiB: the second one has 4 of it, though the first was
+// there before.
+TEST(BlockShare, TheSecondSenderIsLetIntoAFullLane) {
+  Limits limits;
+  limits.lane1_bytes = limits.reserve_bytes = 16 * kKiB;
+  EgressRig rig(limits);
+  TestConnection connection(rig);
+  connection.peer.set_room(0);
+  rig.push(connection.outbox, "first", {.lane = 3});
+  EXPECT_EQ(connection.flush(), Flush::blocked);
+  const auto push = [&](std::uint32_t sender) {
+    rig.push(connection.outbox, sized(kKiB), {.src = sender});
+  };
+  for (int i = 0; i < 9; ++i) push(1);
+  EXPECT_THAT(rig.signals.take(), ElementsAre("pause 1"));
+  for (int i = 0; i < 4; ++i) push(2);
+  EXPECT_THAT(rig.signals.take(), IsEmpty());
+  push(2);
+  EXPECT_THAT(rig.signals.take(), ElementsAre("pause 2"));
+  // The first one may go on when it is down to half of its share, 2 KiB.
+  connection.peer.set_room(5 * kKiB);
+  connection.flush();
+  EXPECT_THAT(rig.signals.take(), IsEmpty());
+  connection.peer.set_room(9 * kKiB);
+  connection.flush();
+  EXPECT_THAT(rig.signals.take(), ElementsAre("resume 1"));
+  EXPECT_TRUE(rig.ledger_exact());
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "hub/data/egress/source_bytes.hpp"
 #include "tests/hub/data/support/egress_rig.hpp"
 
 namespace gimnet::hub {
@@ -26,12 +27,40 @@ TEST(PauseBook, PausesOncePerSenderAndTarget) {
   book.on_full(kTwo, kNormal, 100, false, signals);
   book.on_full(kOne, kBulk, 100, false, signals);
   EXPECT_THAT(signals.take(), ElementsAre("pause 1", "pause 2", "pause 1"));
-  book.on_room(proto::Lane::normal, signals);
+  book.on_room(proto::Lane::normal, ~0u, signals);
   EXPECT_THAT(signals.take(), ElementsAre("resume 1", "resume 2"));
   EXPECT_FALSE(book.empty());
-  book.on_room(proto::Lane::bulk, signals);
+  book.on_room(proto::Lane::bulk, ~0u, signals);
   EXPECT_THAT(signals.take(), ElementsAre("resume 1"));
   EXPECT_TRUE(book.empty());
+}
+
+TEST(PauseBook, GivesRoomToThoseOfAPlace) {
+  FakeSignals signals;
+  PauseBook book;
+  book.on_full(kOne, kNormal, 100, false, signals);
+  book.on_full(kTwo, kNormal, 100, false, signals);
+  EXPECT_TRUE(book.pauses(static_cast<std::size_t>(proto::Lane::normal)));
+  signals.take();
+  book.on_room(proto::Lane::normal, 1u << SourceBytes::place_of(kTwo), signals);
+  EXPECT_THAT(signals.take(), ElementsAre("resume 2"));
+  book.on_room(proto::Lane::normal, 1u << SourceBytes::place_of(kTwo), signals);
+  EXPECT_THAT(signals.take(), IsEmpty());
+  book.on_room(proto::Lane::normal, 1u << SourceBytes::place_of(kOne), signals);
+  EXPECT_THAT(signals.take(), ElementsAre("resume 1"));
+  EXPECT_FALSE(book.pauses(static_cast<std::size_t>(proto::Lane::normal)));
+}
+
+TEST(PauseBook, SaysAgainWhatIsAboutAnotherHub) {
+  FakeSignals signals;
+  PauseBook book;
+  const proto::flow::Target here{proto::Kind::unicast, proto::Lane::normal, 7u << 20 | 99};
+  const proto::flow::Target away{proto::Kind::unicast, proto::Lane::normal, 8u << 20 | 99};
+  book.on_full(kOne, here, 100, false, signals);
+  book.on_full(kTwo, away, 100, false, signals);
+  signals.take();
+  book.say_again(signals);
+  EXPECT_THAT(signals.take(), ElementsAre("pause 2"));
 }
 
 TEST(PauseBook, HoldsOnceAndReleasesAsOften) {
@@ -54,7 +83,7 @@ TEST(PauseBook, CountsWhatComesFromAHeldSender) {
   EXPECT_EQ(book.on_full(kOne, kNormal, 100, true, signals), 100u);
   EXPECT_EQ(book.on_full(kOne, kNormal, 20, true, signals), 120u);
   EXPECT_EQ(book.on_full(kTwo, kNormal, 3, true, signals), 3u) << "of another one";
-  book.on_room(proto::Lane::normal, signals);
+  book.on_room(proto::Lane::normal, ~0u, signals);
   EXPECT_EQ(book.on_full(kOne, kNormal, 5, true, signals), 5u) << "held anew";
 }
 

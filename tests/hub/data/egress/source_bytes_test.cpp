@@ -38,5 +38,19 @@ TEST(SourceBytes, WhatIsNeverDroppedLosesNothingButFills) {
   EXPECT_EQ(sources.fullest(), kOne);
 }
 
+TEST(SourceBytes, CountsThoseThatHaveWhatIsNeverDropped) {
+  SourceBytes sources;
+  EXPECT_EQ(sources.fixed_sources(), 1u) << "nobody shares with nobody";
+  sources.add(kOne + SourceBytes::kFixed, 2'000);
+  sources.add(kOther + SourceBytes::kFixed, 100);
+  sources.add(5, 100);
+  EXPECT_EQ(sources.fixed_sources(), 2u);
+  EXPECT_EQ(sources.fixed(kOne), 2'000u);
+  const std::uint32_t below = sources.below(100);
+  EXPECT_EQ(below >> kOne & 1, 0u);
+  EXPECT_EQ(below >> kOther & 1, 1u);
+  EXPECT_EQ(below >> 5 & 1, 1u);
+}
+
 }  // namespace
 }  // namespace gimnet::hub
