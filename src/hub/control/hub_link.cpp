@@ -4,6 +4,8 @@
 #include <utility>
 
 #include "base/check.hpp"
+#include "base/log.hpp"
+#include "hub/shard/commands.hpp"
 
 namespace gimnet::hub {
 namespace {
@@ -11,22 +13,25 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::nanoseconds;
 
-LinkCost cost_of(std::uint16_t configured) {
-  return configured != 0 ? LinkCost(configured) : LinkCost();
-}
-
 }  // namespace
 
 HubLink::HubLink(LinkNumber number, DialledLink dialled)
     : number_(number), name_(dialled.name), dialled_(std::move(dialled)) {
   address = dialled_->address.url();
-  cost_ = cost_of(dialled_->cost);
+  follow_cost(dialled_->cost);
 }
 
 void HubLink::fix_cost(std::uint16_t cost) {
   GIMNET_CHECK(is_dialled());
   dialled_->cost = cost;
-  cost_ = cost_of(cost);
+  if (follow_cost(cost)) keep_alive_at_ = milliseconds{0};
+}
+
+bool HubLink::follow_cost(std::uint16_t configured) {
+  if (std::exchange(configured_cost_, configured) == configured) return false;
+  cost_ = configured != 0 ? LinkCost(configured) : LinkCost();
+  if (clock_.round_trip_least != nanoseconds{0}) cost_.note_round_trip(clock_.round_trip_least);
+  return true;
 }
 
 HubIdentity HubLink::identity() const {
@@ -56,8 +61,9 @@ void HubLink::begin_connection(const proto::HubIntroduction& said, const LinkTer
     clock_ = {};
     clock_sample_count_ = 0;
     told_ahead_.reset();
-    cost_ = cost_of(is_dialled() ? dialled_->cost : said.cost);
+    cost_ = configured_cost_ != 0 ? LinkCost(configured_cost_) : LinkCost();
   }
+  if (!is_dialled()) follow_cost(said.cost);
   resume_until_.reset();
   dial_at_.reset();
   backoff_.reset();
@@ -81,6 +87,21 @@ void HubLink::end_connection(bool at_once, milliseconds now) {
   resume_until_ = now + kResumeTime + 4 * round_trip;
 }
 
+void HubLink::note_detached(const DetachedEvent& event) {
+  epoch = event.epoch;
+  peer_epoch = event.peer_epoch;
+  taken = event.taken;
+  const bool done = event.code == proto::GoodbyeCode::done;
+  const bool said = event.said_by_peer || !done;
+  last_error = said ? (event.said_by_peer ? "the other hub said goodbye: " : "closed: ") +
+                          std::string{proto::goodbye_name(event.code)} +
+                          (event.sentence.empty() ? "" : ": ") + event.sentence
+                    : "the connection broke";
+  // `done` is an administrator's wish.
+  log_line(event.said_by_peer && done ? LogLevel::info : LogLevel::warning, {"link", name_},
+           "link " + name_ + " to " + title() + ": " + last_error);
+}
+
 proto::route::KeepAlive HubLink::say_keep_alive(std::uint64_t digest, milliseconds now,
                                                 std::int64_t wall_ns) {
   keep_alive_at_ = now + milliseconds{keep_alive_ms_};
@@ -89,6 +110,7 @@ proto::route::KeepAlive HubLink::say_keep_alive(std::uint64_t digest, millisecon
   said.heard_sent_ns = heard_sent_ns_;
   said.heard_ns = heard_ns_;
   said.digest = digest;
+  if (is_dialled()) said.cost = dialled_->cost;
   return said;
 }
 
@@ -97,15 +119,22 @@ bool HubLink::hear_keep_alive(const proto::route::KeepAlive& heard, milliseconds
   heard_at_ = now;
   heard_sent_ns_ = heard.sent_ns;
   heard_ns_ = wall_ns;
-  if (heard.heard_sent_ns == 0) return false;
+  const bool told = !is_dialled() && follow_cost(heard.cost);
+  if (told) {
+    const std::string cost = heard.cost != 0 ? std::to_string(heard.cost) : "what is measured";
+    log_line(LogLevel::info, {"link", name_},
+             "link " + name_ + " to " + title() + ": costs " + cost +
+                 " from now on, by an administrator of the other hub");
+  }
+  if (heard.heard_sent_ns == 0) return told;
   const std::int64_t held = heard.sent_ns - heard.heard_ns;
   const nanoseconds round_trip{(wall_ns - heard.heard_sent_ns) - held};
   // A clock that was set meanwhile tells nothing.
-  if (held < 0 || round_trip < nanoseconds{0} || round_trip > std::chrono::minutes(1)) return false;
+  if (held < 0 || round_trip < nanoseconds{0} || round_trip > std::chrono::minutes(1)) return told;
   if (clock_.round_trip_least == nanoseconds{0} || round_trip < clock_.round_trip_least)
     clock_.round_trip_least = std::max(round_trip, nanoseconds{1});
   compare_clocks({round_trip, nanoseconds{heard.sent_ns - wall_ns} + round_trip / 2});
-  return cost_.note_round_trip(clock_.round_trip_least);
+  return cost_.note_round_trip(clock_.round_trip_least) || told;
 }
 
 /// A process that lost its power was heard a moment ago, too. A keep-alive may have been under way

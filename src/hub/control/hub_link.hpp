@@ -17,6 +17,8 @@
 
 namespace gimnet::hub {
 
+struct DetachedEvent;
+
 /// The clock of the hub at the other end of a link, compared with this hub's.
 struct LinkClock {
   std::chrono::nanoseconds round_trip_least{};  ///< of this connection; 0: not measured
@@ -49,6 +51,7 @@ class HubLink {
   [[nodiscard]] bool is_dialled() const { return dialled_.has_value(); }
   /// REQUIRES: is_dialled().
   [[nodiscard]] const DialledLink& dialled() const { return *dialled_; }
+  /// 0: measured. The next keep-alive tells the other end, at once.
   void fix_cost(std::uint16_t cost);
 
   /// The other end, as HELLO or WELCOME said; of before the first connection: nothing.
@@ -62,6 +65,8 @@ class HubLink {
                         std::chrono::milliseconds now);
   /// The connection broke. `at_once`: one end said GOODBYE, and nothing is resumed.
   void end_connection(bool at_once, std::chrono::milliseconds now);
+  /// Keeps what `event` tells of the connection that ended, and says in the log why it did.
+  void note_detached(const DetachedEvent& event);
   [[nodiscard]] bool connected() const { return connected_; }
   /// Until then a broken link may be resumed, and frames wait. Nothing: it is not broken.
   [[nodiscard]] std::optional<std::chrono::milliseconds> resume_until() const {
@@ -81,7 +86,7 @@ class HubLink {
   [[nodiscard]] proto::route::KeepAlive say_keep_alive(std::uint64_t digest,
                                                        std::chrono::milliseconds now,
                                                        std::int64_t wall_ns);
-  /// True: the cost is another one now.
+  /// True: the cost is another one now. If the other end fixed it, the log says so.
   [[nodiscard]] bool hear_keep_alive(const proto::route::KeepAlive& heard,
                                      std::chrono::milliseconds now, std::int64_t wall_ns);
   enum class Alive : std::uint8_t { yes, no, not_known };
@@ -126,6 +131,8 @@ class HubLink {
     std::chrono::nanoseconds ahead{};
   };
   void compare_clocks(ClockSample sample);
+  /// True: it was another one. 0: measured.
+  bool follow_cost(std::uint16_t configured);
 
   const LinkNumber number_;
   const std::string name_;
@@ -139,6 +146,7 @@ class HubLink {
   std::optional<std::chrono::milliseconds> asked_at_;  ///< whether it is alive
   std::int64_t heard_sent_ns_ = 0;                     ///< of the last keep-alive heard; 0: none
   std::int64_t heard_ns_ = 0;
+  std::uint16_t configured_cost_ = 0;                  ///< by the side that dialled; 0: measured
   LinkCost cost_;
   LinkClock clock_;
   std::array<ClockSample, kClockSamples> clock_samples_;

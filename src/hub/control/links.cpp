@@ -210,16 +210,7 @@ void Links::on_route(const SessionRef& session, std::uint32_t attachment,
 void Links::on_detached(const DetachedEvent& event, Moment moment) {
   HubLink* link = find(event.session);
   if (link == nullptr || !link->connected() || link->attachment != event.attachment) return;
-  link->epoch = event.epoch;
-  link->peer_epoch = event.peer_epoch;
-  link->taken = event.taken;
-  const bool said = event.said_by_peer || event.code != GoodbyeCode::done;
-  link->last_error = said ? (event.said_by_peer ? "the other hub said goodbye: " : "closed: ") +
-                                std::string{proto::goodbye_name(event.code)} +
-                                (event.sentence.empty() ? "" : ": ") + event.sentence
-                          : "the connection broke";
-  log_line(LogLevel::warning, {"link", link->name()},
-           "link " + link->name() + " to " + link->title() + ": " + link->last_error);
+  link->note_detached(event);
   end_connection(*link, !is_break(event), moment);
   advance(moment);
 }
@@ -370,7 +361,7 @@ std::string Links::remove(std::string_view name) {
   HubLink* const link = find(name);
   if (link == nullptr) return "there is no link '" + std::string{name} + "'; see gimnet links";
   if (!link->is_dialled()) return "the other side dials that link; remove it there";
-  close(*link, GoodbyeCode::done, "the link was removed");
+  close(*link, GoodbyeCode::done, "an administrator of the other hub removed the link");
   withdraw(*link);
   links_.erase(link->number());
   return {};
@@ -381,8 +372,7 @@ std::string Links::set_cost(std::string_view name, std::uint16_t cost) {
   if (link == nullptr) return "there is no link '" + std::string{name} + "'; see gimnet links";
   if (!link->is_dialled()) return "the other side dials that link; set its cost there";
   link->fix_cost(cost);
-  // The other end hears of it by the next HELLO.
-  close(*link, GoodbyeCode::replaced, "the link has another cost");
+  network_.set_cost(link->number(), link->cost());
   return {};
 }
 

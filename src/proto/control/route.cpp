@@ -28,7 +28,7 @@ enum : std::uint32_t {
 }  // namespace record_key
 
 namespace keep_alive_key {
-enum : std::uint32_t { sent = 1, heard_sent, heard, taken, digest };
+enum : std::uint32_t { sent = 1, heard_sent, heard, taken, digest, cost };
 }  // namespace keep_alive_key
 
 constexpr std::size_t kUniqueIdSize = sizeof(UniqueId::bytes);
@@ -147,6 +147,7 @@ void KeepAlive::write(bitestream::Writer& writer) const {
   if (heard_ns != 0) writer.put_time(key::heard, heard_ns);
   writer.put_u64(key::taken, taken);
   writer.put_u64(key::digest, digest);
+  if (cost != 0) writer.put_u16(key::cost, cost);
 }
 
 KeepAlive KeepAlive::read(Fields& fields) {
@@ -157,6 +158,7 @@ KeepAlive KeepAlive::read(Fields& fields) {
   alive.heard_ns = fields.time(key::heard, "time of hearing");
   alive.taken = fields.required_number<std::uint64_t>(key::taken, "count of frames taken");
   alive.digest = fields.required_number<std::uint64_t>(key::digest, "digest");
+  alive.cost = fields.number<std::uint16_t>(key::cost, "cost", 0);
   return alive;
 }
 

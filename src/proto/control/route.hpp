@@ -92,6 +92,7 @@ struct KeepAlive {
   std::int64_t heard_ns = 0;       ///< the time when that came
   std::uint64_t taken = 0;         ///< data frames taken over this link
   std::uint64_t digest = 0;        ///< of the records of all hubs that this side can reach
+  std::uint16_t cost = 0;          ///< from the side that dialled: of the link; 0: measured
   void write(bitestream::Writer& writer) const;
   [[nodiscard]] static KeepAlive read(Fields& fields);
   friend bool operator==(const KeepAlive&, const KeepAlive&) = default;

@@ -174,12 +174,40 @@ TEST(Links, TheShorterOfTwoWaysIsTakenAndTheOtherWhenItEnds) {
   EXPECT_NE(hubs.b.links.remove("second"), "") << "there is none any more";
 }
 
+TEST(Links, AnotherCostIsToldOverTheLinkThatStands) {
+  LinkedRigs hubs;
+  hubs.link();
+  for (int i = 0; i < 3; ++i) hubs.pass(milliseconds{250});
+  const auto cost_at = [](const LinkRig& hub, HubId far) {
+    for (const Way& way : hub.links.network().map().ways()) {
+      if (way.hub.hub == far) return way.cost;
+    }
+    return 0u;
+  };
+  const std::uint32_t measured = cost_at(hubs.a, kB);
+  for (const std::uint16_t cost : {300, 50}) {
+    ASSERT_EQ(hubs.b.links.set_cost("up", cost), "");
+    for (int i = 0; i < 4; ++i) hubs.pass(milliseconds{100});
+    EXPECT_EQ(cost_at(hubs.a, kB), cost) << "the higher of both ends counts";
+    EXPECT_EQ(cost_at(hubs.b, kA), cost);
+  }
+  ASSERT_EQ(hubs.b.links.set_cost("up", 0), "");
+  for (int i = 0; i < 4; ++i) hubs.pass(milliseconds{100});
+  EXPECT_EQ(cost_at(hubs.a, kB), measured) << "as it was measured before";
+  EXPECT_TRUE(hubs.b.shards.all<CloseCommand>().empty());
+  EXPECT_TRUE(hubs.b.routes.find(kA).exists());
+  EXPECT_NE(hubs.a.links.set_cost("up", 50), "") << "the side that dials decides";
+}
+
 TEST(Links, TheLastOneThatIsRemovedLeavesNobodyReachable) {
   LinkedRigs hubs(LinkRig::dialling("only", 5));
   hubs.link();
   hubs.pass(milliseconds{100});
   ASSERT_EQ(hubs.b.links.network().map().reachable().size(), 2u);
   ASSERT_EQ(hubs.b.links.remove("only"), "");
+  const auto closed = hubs.b.shards.all<CloseCommand>();
+  ASSERT_THAT(closed, ::testing::SizeIs(1));
+  EXPECT_NE(closed[0]->sentence.find("an administrator of the other hub"), std::string::npos);
   ASSERT_TRUE(hubs.b.links.next_deadline()) << "there is a map to be computed";
   hubs.b.pass(milliseconds{100});
   EXPECT_EQ(hubs.b.links.network().map().reachable().size(), 1u);

@@ -45,7 +45,7 @@ TEST(RouteMessages, AreDecodedAndWrittenAsTheVectorsSay) {
   constexpr std::int64_t kTime = 1767225600000000000;
   test::expect_request(
       "route/keep_alive", 0,
-      KeepAlive{kTime, kTime - 15'000'000, kTime - 10'000'000, 40, 0x0123456789abcdef});
+      KeepAlive{kTime, kTime - 15'000'000, kTime - 10'000'000, 40, 0x0123456789abcdef, 20});
 }
 
 TEST(RouteRecord, OfAllFieldsReadsAsItWasWritten) {
