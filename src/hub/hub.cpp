@@ -146,10 +146,11 @@ HubOptions identified(HubOptions options, std::vector<DialledLink> dial, const H
   return options;
 }
 
-HubFacts facts_of(const HubOptions& options, const StartState& from) {
+HubFacts facts_of(const HubOptions& options, const StartState& from, bool redrawn) {
   HubFacts facts;
   facts.id = options.id;
   facts.id_configured = options.id_configured;
+  facts.redrawn = redrawn;
   std::memcpy(facts.unique.bytes.data(), from.start.state.unique_id.data(),
               facts.unique.bytes.size());
   facts.instance = from.instance;
@@ -166,17 +167,18 @@ HubFacts facts_of(const HubOptions& options, const StartState& from) {
 /// In the order in which they need each other: shards end before the conductor frees what they look
 /// at.
 struct Hub::Parts {
-  /// `given`: as configured. `dial`: the links to dial.
-  Parts(const HubOptions& given, std::vector<DialledLink> dial, const ConfigSources& sources,
-        StartState from, std::vector<std::unique_ptr<Listener>> listeners)
-      : options(identified(given, std::move(dial), from.start.state)),
+  /// `given`: as configured. `former`: the hub that it succeeds.
+  Parts(const HubOptions& given, const std::optional<Succession>& former,
+        const ConfigSources& sources, StartState from,
+        std::vector<std::unique_ptr<Listener>> listeners)
+      : options(identified(given, former ? former->links : given.links.dial, from.start.state)),
         reloader(sources, given),
         limits(given.limits),
         state_folder(std::move(from.folder)),
         ground(options),
         shared(ground.shared(options)),
         shards(shared, {.spin = options.spin}),
-        conductor(facts_of(options, from), options.placement, limits,
+        conductor(facts_of(options, from, former.has_value()), options.placement, limits,
                   Conductor::Wiring{shards,
                                     {ground.nodes, ground.groups, ground.quiescence},
                                     ground.readable,
@@ -253,8 +255,8 @@ Result<std::unique_ptr<Hub>> Hub::start(const HubOptions& options, const ConfigS
                    .wall = wall});
   if (!state) return state.error();
   std::unique_ptr<Hub> hub(
-      new Hub(std::make_unique<Parts>(options, former ? former->links : options.links.dial, sources,
-                                      std::move(*state), std::move(listeners))));
+      new Hub(std::make_unique<Parts>(options, former, sources, std::move(*state),
+                                      std::move(listeners))));
   hub->parts_->shards.start();
   return hub;
 }

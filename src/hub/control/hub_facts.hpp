@@ -13,6 +13,7 @@ namespace gimnet::hub {
 struct HubFacts {
   HubId id{1};
   bool id_configured = false;   ///< and not drawn, nor the default
+  bool redrawn = false;         ///< it began anew when it started, since another hub kept its id
   proto::UniqueId unique;       ///< of its state folder
   proto::HubInstance instance;  ///< of this start
   bool insecure = false;        ///< it may link to other machines

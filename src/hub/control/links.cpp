@@ -71,7 +71,13 @@ std::optional<Goodbye> Links::admit(Stranger& stranger, const proto::Hello& hell
 /// the first one goes on to be heard.
 std::optional<Goodbye> Links::judge(const proto::HubIntroduction& said, Moment moment) {
   LinkAdmissionAnswer answer = network_.admit({said.hub, said.instance, said.configured});
-  if (answer.admission == LinkAdmission::draw_again) draw_again();
+  if (answer.admission == LinkAdmission::draw_again) {
+    if (may_give_way(moment.now)) {
+      draw_again();
+    } else {
+      answer.admission = LinkAdmission::id_taken;
+    }
+  }
   if (answer.admission != LinkAdmission::ask_old_link) return handshake_.refusal_of(said, answer);
   HubLink* old = find(answer.old_link);
   if (old == nullptr) return std::nullopt;
@@ -307,7 +313,7 @@ void Links::leave_network(Verdict verdict, Moment moment) {
                    " is kept by another hub of the network; give one of them another one with "
                    "--hub-id";
   log_line(LogLevel::error, {"left", "network"}, "left the network: " + sentence);
-  if (!copied) draw_again();
+  if (!copied && may_give_way(moment.now)) draw_again();
   network_.leave();
   for (const auto& [number, link] : links_) {
     if (!link->place) continue;

@@ -34,6 +34,8 @@ namespace gimnet::hub {
 class Links {
  public:
   static constexpr std::size_t kLinksMax = 4'093;
+  /// A hub that began anew gives way to no other hub before: whoever may link could end it at will.
+  static constexpr std::chrono::milliseconds kRedrawPause = std::chrono::minutes(1);
 
   /// A dial that was asked for; on_dialled() tells how it ended.
   using Dial = std::function<void(LinkNumber, const DialledLink&, const proto::Hello&)>;
@@ -102,6 +104,9 @@ class Links {
   void draw_again() {
     if (!wiring_.facts.id_configured && !redrawn_)
       redrawn_ = network_.draw_hub_id(wiring_.random());
+  }
+  [[nodiscard]] bool may_give_way(std::chrono::milliseconds now) const {
+    return !wiring_.facts.redrawn || now - wiring_.facts.started >= kRedrawPause;
   }
   void leave_network(Verdict verdict, Moment moment);
   void publish_routes();

@@ -131,6 +131,35 @@ TEST(Links, AnIdThatNobodyConfiguredIsDrawnAnewIfItIsTaken) {
   EXPECT_FALSE(redrawn_when_taken(true));
 }
 
+TEST(Links, ADrawnIdGivesWayToAConfiguredOneOnceAMinute) {
+  for (const bool redrawn : {false, true}) {
+    LinkRig hub(1'500, LinkRig::accepting(), 0, false);
+    hub.facts.redrawn = redrawn;
+    hub.facts.started = hub.now;
+    LinkRig twin(1'500, LinkRig::dialling());
+    twin.links.tick(twin.moment());
+    proto::Hello hello = twin.dialled.back().hello;
+    hello.introduction->hub.unique.bytes = {};
+    hello.introduction->instance = proto::HubInstance{77};
+    const auto refused_with = [&] {
+      const auto refusal = hub.admit(hello);
+      return refusal ? refusal->code : GoodbyeCode::done;
+    };
+    hello.introduction->configured = false;
+    EXPECT_EQ(refused_with(), GoodbyeCode::id_taken) << "one HELLO does not end a hub";
+    EXPECT_FALSE(hub.links.redrawn());
+    hello.introduction->configured = true;
+    if (redrawn) {
+      hub.now += Links::kRedrawPause - milliseconds{1};
+      EXPECT_EQ(refused_with(), GoodbyeCode::id_taken);
+      EXPECT_FALSE(hub.links.redrawn());
+      hub.now += milliseconds{1};
+    }
+    EXPECT_EQ(refused_with(), GoodbyeCode::draining);
+    EXPECT_TRUE(hub.links.redrawn());
+  }
+}
+
 TEST(Links, AHubThatMeetsItselfTriesAgainLater) {
   LinkRig hub(1, LinkRig::dialling());
   hub.links.tick(hub.moment());

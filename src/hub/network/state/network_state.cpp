@@ -25,8 +25,11 @@ LinkAdmissionAnswer NetworkState::admit(const HubIdentity& newcomer) const {
       return {LinkAdmission::ask_old_link, peer.key, number};
   }
   if (newcomer.key.hub == self.key.hub) {
-    if (!self.configured && is_preferred(newcomer, self)) return {LinkAdmission::draw_again};
-    return {LinkAdmission::id_taken, self.key};
+    // Nobody has verified what it says: hubs of which neither id was configured are told apart at
+    // its expense, whatever its unique id.
+    const bool gives_way = newcomer.configured && !self.configured;
+    return gives_way ? LinkAdmissionAnswer{LinkAdmission::draw_again}
+                     : LinkAdmissionAnswer{LinkAdmission::id_taken, self.key};
   }
   for (const proto::HubKey& hub : map_.reachable()) {
     if (hub == self.key) continue;

@@ -25,8 +25,9 @@ struct LinkRig {
     LinkNumber link;
     proto::Hello hello;
   };
-  LinkRig(std::uint16_t id, LinksOptions options, std::uint64_t instance = 0)
-      : facts(facts_of(id, instance)),
+  LinkRig(std::uint16_t id, LinksOptions options, std::uint64_t instance = 0,
+          bool configured = true)
+      : facts(facts_of(id, instance, configured)),
         links(std::move(options),
               {facts, limits, shards, slots, routes, names, groups,
                [this](LinkNumber link, const DialledLink&, const proto::Hello& hello) {
@@ -34,10 +35,10 @@ struct LinkRig {
                },
                [this] { return ++random; }}) {}
 
-  static HubFacts facts_of(std::uint16_t id, std::uint64_t instance) {
+  static HubFacts facts_of(std::uint16_t id, std::uint64_t instance, bool configured) {
     HubFacts facts;
     facts.id = HubId{id};
-    facts.id_configured = true;
+    facts.id_configured = configured;
     facts.name = "hub-" + std::to_string(id);
     facts.unique.bytes[0] = static_cast<std::uint8_t>(id);
     facts.unique.bytes[1] = 1;

@@ -273,14 +273,14 @@ TEST_F(HubWithTwoLinks, RefusesAnIdThatAnotherHubKeeps) {
   EXPECT_EQ(hub_.admit(own).holder, hub_.self().key);
 }
 
-TEST(NetworkStateAdmission, DrawsAgainForAPreferredNewcomer) {
+TEST(NetworkStateAdmission, DrawsAgainForAConfiguredNewcomer) {
   const NetworkState drawn({hub_key(1'500, 9), proto::HubInstance{55}, false}, {});
   const HubIdentity configured{hub_key(1'500, 99), proto::HubInstance{9}, true};
   EXPECT_EQ(drawn.admit(configured).admission, LinkAdmission::draw_again);
   const HubIdentity drawn_too{hub_key(1'500, 99), proto::HubInstance{9}, false};
   EXPECT_EQ(drawn.admit(drawn_too).admission, LinkAdmission::id_taken);
   const HubIdentity lower{hub_key(1'500, 8), proto::HubInstance{9}, false};
-  EXPECT_EQ(drawn.admit(lower).admission, LinkAdmission::draw_again);
+  EXPECT_EQ(drawn.admit(lower).admission, LinkAdmission::id_taken) << "nobody has verified it";
 }
 
 TEST(NetworkStateDraw, AvoidsIdsThatAreKnown) {
