@@ -304,14 +304,23 @@ void Links::send_all(std::span<const Sending> sendings) {
   }
 }
 
+std::string Links::taken_sentence() {
+  const Way& way = *network_.map().own_id_holder();
+  const StoredRecord* record = network_.store().find(way.hub);
+  const std::string name = record == nullptr ? std::string{} : record->head()->name;
+  const HubLink* link = find(way.link);
+  return "hub id " + std::to_string(way.hub.hub.value()) + " is kept by another hub" +
+         (name.empty() ? "" : " '" + name + "'") +
+         (link == nullptr ? "" : ", as " + link->title() + " says over link " + link->name()) +
+         "; give one of them another one with --hub-id";
+}
+
 /// It serves its own nodes, and tries again.
 void Links::leave_network(Verdict verdict, Moment moment) {
   const bool copied = verdict == Verdict::copied;
   const std::string sentence =
       copied ? "another machine runs a copy of this state folder; delete it on one of them"
-             : "hub id " + std::to_string(wiring_.facts.id.value()) +
-                   " is kept by another hub of the network; give one of them another one with "
-                   "--hub-id";
+             : taken_sentence();
   log_line(LogLevel::error, {"left", "network"}, "left the network: " + sentence);
   if (!copied && may_give_way(moment.now)) draw_again();
   network_.leave();

@@ -160,6 +160,37 @@ TEST(Links, ADrawnIdGivesWayToAConfiguredOneOnceAMinute) {
   }
 }
 
+TEST(Links, AHubThatLosesItsIdSaysWhereTheClaimCameFrom) {
+  LinkedRigs hubs;
+  hubs.link();
+  // Hub 1 hears over its link that another hub 1, with a lower unique id, is behind hub 2.
+  const auto hear = [&hubs](proto::HubKey said_by, proto::HubInstance instance, proto::HubKey neighbour,
+                            std::string name) {
+    proto::route::RecordPart part;
+    part.hub = said_by;
+    part.instance = instance;
+    part.configured = true;
+    part.sequence = 100;
+    part.name = std::move(name);
+    part.neighbours.push_back({neighbour, 10});
+    if (said_by.hub == kB) part.neighbours.push_back({hubs.a.links.network().self().key, 10});
+    hubs.a.links.on_route(hubs.a.attached().session, hubs.a.attached().attachment,
+                          proto::encode(part), hubs.a.moment());
+  };
+  const HubIdentity two = hubs.b.links.network().self();
+  const proto::HubKey twin{kA, {}};
+  hear(twin, proto::HubInstance{77}, two.key, "twin");
+  hubs.a.now += milliseconds{1'000};
+  hear(two.key, two.instance, twin, "hub-2");
+  hubs.a.pass(milliseconds{1'000});
+  const auto closed = hubs.a.shards.all<CloseCommand>();
+  ASSERT_THAT(closed, ::testing::SizeIs(1));
+  EXPECT_EQ(closed[0]->code, GoodbyeCode::id_taken);
+  EXPECT_EQ(closed[0]->sentence,
+            "hub id 1 is kept by another hub 'twin', as hub 2 'hub-2' says over link up; give one "
+            "of them another one with --hub-id");
+}
+
 TEST(Links, AHubThatMeetsItselfTriesAgainLater) {
   LinkRig hub(1, LinkRig::dialling());
   hub.links.tick(hub.moment());

@@ -143,7 +143,7 @@ void NetworkMap::keep_preferred(const HubIdentity& self, const RecordStore& stor
   const auto identity = [&store](const HubKey& hub) { return *identity_of(*store.find(hub)); };
   for (const Way& way : ways) {
     if (way.hub.hub == self.key.hub) {
-      if (is_preferred(identity(way.hub), self)) own_id_holder_ = way.hub;
+      if (is_preferred(identity(way.hub), self)) own_id_holder_ = way;
       continue;
     }
     if (!ways_.empty() && ways_.back().hub.hub == way.hub.hub) {

@@ -52,8 +52,8 @@ class NetworkMap {
   [[nodiscard]] const std::vector<Way>& ways() const { return ways_; }
   /// By hub id: the link that a frame for that hub takes; 0: none.
   [[nodiscard]] const std::array<LinkNumber, kHubIds>& next_hops() const { return next_hops_; }
-  /// Another hub can be reached that keeps this hub's id. Nothing: there is none.
-  [[nodiscard]] const std::optional<proto::HubKey>& own_id_holder() const { return own_id_holder_; }
+  /// The way to another hub that keeps this hub's id. Nothing: none can be reached.
+  [[nodiscard]] const std::optional<Way>& own_id_holder() const { return own_id_holder_; }
 
  private:
   void keep_preferred(const HubIdentity& self, const RecordStore& store,
@@ -62,7 +62,7 @@ class NetworkMap {
   std::vector<proto::HubKey> reachable_;
   std::vector<Way> ways_;
   std::array<LinkNumber, kHubIds> next_hops_{};
-  std::optional<proto::HubKey> own_id_holder_;
+  std::optional<Way> own_id_holder_;
 };
 
 /// The identity that a record tells. Nothing: its part 0 is not known.

@@ -133,11 +133,13 @@ TEST(NetworkMap, SeesWhoKeepsItsOwnId) {
   };
   const auto lower = proto::HubKey{HubId{1}, {}};
   const auto higher = hub_key(1, 200);
-  EXPECT_EQ(beside({}, lower).own_id_holder(), lower);
-  EXPECT_EQ(beside({}, higher).own_id_holder(), std::nullopt);
-  EXPECT_EQ(beside(Drawing().drawn(lower), lower).own_id_holder(), std::nullopt);
+  const auto holder = beside({}, lower).own_id_holder();
+  ASSERT_TRUE(holder);
+  EXPECT_EQ(holder->hub, lower);
+  EXPECT_FALSE(beside({}, higher).own_id_holder());
+  EXPECT_FALSE(beside(Drawing().drawn(lower), lower).own_id_holder());
   const auto out_of_reach = Drawing().says(lower, hub_key(2), 10).edge(1, 2).map();
-  EXPECT_EQ(out_of_reach.own_id_holder(), std::nullopt);
+  EXPECT_FALSE(out_of_reach.own_id_holder());
 }
 
 TEST(NetworkMap, OfOneHubHasNoWay) {

@@ -216,7 +216,9 @@ TEST_F(HubWithTwoLinks, LeavesWhenAnotherHubKeepsItsId) {
   hub_.take_record(kFirst, bytes(two_, 3, {{other.key, 10}, {hub_key(5), 10}}), later_);
   hub_.advance(later_ + seconds(1));
   EXPECT_EQ(hub_.verdict(), Verdict::id_taken);
-  EXPECT_EQ(hub_.map().own_id_holder(), other.key);
+  ASSERT_TRUE(hub_.map().own_id_holder());
+  EXPECT_EQ(hub_.map().own_id_holder()->hub, other.key);
+  EXPECT_EQ(hub_.map().own_id_holder()->link, kFirst) << "where the claim came from";
   hub_.leave();
   EXPECT_EQ(hub_.verdict(), Verdict::stay);
   hub_.renumber(HubId{1'500});
