@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Names across linked hubs: three in a chain, and strangers at its ends."""
 
+import json
 import signal
 import time
 import unittest
@@ -101,15 +102,27 @@ class Moves(Case):
         wait_until(lambda: self.is_held_by(robot.id), "the robot is known")
         return robot
 
-    def holder(self, asker=None):
+    def holder(self, asker=None, name="robot"):
         """By what the hub of the asker knows, the second one; None: nobody."""
         try:
-            return (asker or self.viewer).resolve("robot")
+            return (asker or self.viewer).resolve(name)
         except Denied:
             return None
 
     def is_held_by(self, node):
         return self.holder() == node
+
+    def link(self, what):
+        """Adds or removes the link, and waits until the first hub has seen it."""
+        done = run_gimnet(f"unix:{self.second.socket_path}", "ctl", "link", what, self.first.url)
+        self.assertEqual(done.code, 0, done.err)
+        seen = [2] if what == "add" else []
+
+        def reached():
+            hubs = json.loads(run_gimnet(self.first, "hubs", "--json").out or "[]")
+            return [each["id"] for each in hubs if each["reachable"] and each["id"] != 1]
+
+        wait_until(lambda: reached() == seen, f"link {what} is seen")
 
     def come(self, robot, token=None):
         """The robot at the second hub."""
@@ -145,6 +158,30 @@ class Moves(Case):
             self.stranger(self.second, "robot")  # the name is unreachable, or not yet
         moved = self.come(robot)
         self.assertTrue(self.is_held_by(moved.id))
+
+    def test_a_former_id_gives_a_name_only_until_the_hubs_talk_again(self):
+        """And not if the node there is away by then: it may be the one that came."""
+        for is_away in (False, True):
+            name = f"robot/{is_away}"
+            robot = self.stranger(self.second, name)
+            watcher = self.stranger(self.first, "watcher")
+            wait_until(lambda: self.holder(watcher, name) == robot.id, "the robot is known")
+            self.link("remove")
+            came = self.stranger(self.first, name, token=bytes(56), extra=put(13, U32, robot.id))
+            self.assertEqual(self.holder(watcher, name), came.id)
+            if is_away:
+                robot.close()
+                self.until_away(self.viewer, name)
+            self.link("add")
+            if is_away:
+                wait_until(lambda: self.holder(self.viewer, name) == came.id, "it has moved")
+                self.assertEqual(fields(watcher.ask(NS, 4, put(3, U32, came.id)))[3], name)
+            else:
+                lost = came.wait(lambda got: got.kind == NS and got.body[:4] == b"\x24\0\0\0")
+                self.assertEqual(fields(lost.body[4:])[4], robot.id)
+                self.assertEqual(self.holder(watcher, name), robot.id)
+                self.assertEqual(fields(self.viewer.ask(NS, 4, put(3, U32, robot.id)))[3], name)
+            watcher.leave()
 
     def test_a_program_that_knows_both_hubs_goes_on_at_the_other_one(self):
         both = f"{self.first.url},{self.second.url}"

@@ -79,7 +79,7 @@ void write_name(bitestream::Writer& writer, const NameRecord& record) {
     writer.put_u8(key::state, static_cast<std::uint8_t>(claim.state));
   if (claim.state == NameState::deleted) return;
   writer.put_u32(key::node, claim.node.value());
-  if (claim.rank != 1) writer.put_u32(key::rank, claim.rank);
+  if (claim.rank != kOrdinaryRank) writer.put_u32(key::rank, claim.rank);
   if (claim.service) write_service(writer, *claim.service);
 }
 
@@ -93,7 +93,7 @@ NameRecord read_name(Fields& fields) {
   claim.state = read_choice(fields, key::state, "state of a name", NameState::deleted);
   if (claim.state == NameState::deleted) return record;
   claim.node = NodeId{fields.required_number<std::uint32_t>(key::node, "node id")};
-  claim.rank = fields.number<std::uint32_t>(key::rank, "rank", 1);
+  claim.rank = fields.number<std::uint32_t>(key::rank, "rank", kOrdinaryRank);
   if (fields.has(key::group)) claim.service = read_service(fields);
   return record;
 }

@@ -23,6 +23,10 @@ inline constexpr std::size_t kNamesKnownMax = 512;
 /// NAMES messages that may be under way on a link.
 inline constexpr std::size_t kNamesWindow = 4;
 
+/// The rank of a claim that follows no other one. There is room below it: a node that shows nothing
+/// but its former id has the rank below that of its former claim.
+inline constexpr std::uint32_t kOrdinaryRank = 65'536;
+
 /// The state of a name at its hub.
 enum class NameState : std::uint8_t {
   held = 0,
@@ -47,7 +51,7 @@ struct ServiceClaim {
 struct NameClaim {
   std::uint64_t version = 0;  ///< of the hub's names, when this changed last
   NodeId node;                ///< that has the name, or provides the service
-  std::uint32_t rank = 1;     ///< of two claims to a name the higher one wins
+  std::uint32_t rank = kOrdinaryRank;
   NameState state = NameState::held;
   std::optional<ServiceClaim> service;
   friend bool operator==(const NameClaim&, const NameClaim&) = default;

@@ -30,7 +30,7 @@ ServiceClaim service_of_the_vector() {
 
 Names names_of_the_vector() {
   Names names{kHub, HubInstance{0x1122334455667788}, 4, 9, 2, {}};
-  names.records.push_back({"robot/old", {5, NodeId{}, 1, NameState::deleted, {}}});
+  names.records.push_back({"robot/old", {5, NodeId{}, kOrdinaryRank, NameState::deleted, {}}});
   names.records.push_back({"robot", claim_of(7, 17)});
   names.records.back().claim.rank = 2;
   names.records.back().claim.state = NameState::away;

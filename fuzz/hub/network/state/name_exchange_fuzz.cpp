@@ -99,7 +99,7 @@ class Run {
     const std::uint32_t choice = choices_.byte();
     claim.node = make_id<NodeId>(hub, choice % 4 + 1);
     claim.state = static_cast<route::NameState>(choice / 4 % 3);
-    claim.rank = choice / 16 % 2 + 1;
+    claim.rank = choice / 16 % 2 + proto::route::kOrdinaryRank;
     if (choice >= 192) {
       claim.service.emplace();
       claim.service->group = make_id<GroupId>(hub, choice % 4 + 1);

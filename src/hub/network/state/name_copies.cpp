@@ -1,7 +1,6 @@
 #include "hub/network/state/name_copies.hpp"
 
 #include <algorithm>
-#include <limits>
 
 #include "base/check.hpp"
 
@@ -75,15 +74,20 @@ void NameCopies::remove_own(std::string_view name) {
 }
 
 std::uint32_t NameCopies::rank_for(std::string_view name, NodeId node) const {
-  std::uint32_t rank = 0;
+  std::int64_t over = route::kOrdinaryRank - 1;
+  std::int64_t below = std::int64_t{1} << 32;  // no claim has that rank
   for (const auto& entry : index_.claims_to(name)) {
     const auto& [key, claim] = entry;
     if (claim.state == NameState::deleted) continue;
     if (claim.node == node) return claim.rank;
-    if (key.hub == options_.self.hub || known_name(entry).standing != proto::ns::NameStanding::held)
-      rank = std::max(rank, claim.rank);
+    const auto standing = known_name(entry).standing;
+    if (standing == proto::ns::NameStanding::unreachable) {
+      below = std::min<std::int64_t>(below, claim.rank);
+    } else if (key.hub == options_.self.hub || standing == proto::ns::NameStanding::away) {
+      over = std::max<std::int64_t>(over, claim.rank);
+    }
   }
-  return rank == std::numeric_limits<std::uint32_t>::max() ? rank : rank + 1;
+  return static_cast<std::uint32_t>(std::max<std::int64_t>(0, std::min(over + 1, below - 1)));
 }
 
 void NameCopies::renumber(HubId hub) {

@@ -79,8 +79,9 @@ class NameCopies {
   // This hub's own names
 
   /// A node of this hub has the name, or provides the service of that full name. A claim of another
-  /// node than before has the rank that follows those which it takes over. `claim`: version and
-  /// rank are not looked at.
+  /// node than before has a higher rank than those that are away, and a lower one than those that
+  /// cannot be reached: whoever stands there keeps the name. `claim`: version and rank are not
+  /// looked at.
   void put_own(std::string_view name, const proto::route::NameClaim& claim);
   /// Nothing happens for a name that is none of this hub.
   void remove_own(std::string_view name);

@@ -7,6 +7,9 @@ using proto::route::NameState;
 
 bool wins(const NameClaim& claim, const NameClaim& over) {
   if (claim.service.has_value() != over.service.has_value()) return !claim.service;
+  // The away node of a hub that was cut off gives way to the one that the program is elsewhere.
+  const bool away = claim.state == NameState::away;
+  if (away != (over.state == NameState::away)) return !away;
   if (claim.rank != over.rank) return claim.rank > over.rank;
   return claim.node < over.node;
 }

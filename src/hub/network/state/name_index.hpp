@@ -13,7 +13,8 @@
 namespace gimnet::hub {
 
 /// Of two claims to one name the one that wins, at every hub: that of a node before that of a
-/// service, then the higher rank, then the lower node id.
+/// service, one that is held before one that is away, then the higher rank, then the lower node id.
+/// REQUIRES: neither is deleted.
 [[nodiscard]] bool wins(const proto::route::NameClaim& claim, const proto::route::NameClaim& over);
 
 /// The claims of all hubs to names, one for each name and hub, deleted ones included. Those that

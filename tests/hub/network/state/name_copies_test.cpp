@@ -7,6 +7,7 @@
 namespace gimnet::hub {
 namespace {
 
+using proto::route::kOrdinaryRank;
 using proto::route::NameClaim;
 using proto::route::Names;
 using proto::route::NameState;
@@ -147,7 +148,7 @@ TEST_F(NameCopiesTest, TellsWhichOwnNamesAreLostToABetterClaim) {
   copies_.put_own("mine", node_claim(1, 1));
   copies_.put_own("theirs", node_claim(1, 2));
   auto better = node_claim(2, 2, 2);
-  better.rank = 2;
+  better.rank = kOrdinaryRank + 1;
   (void)copies_.take(names(0, 2, {{"mine", node_claim(2, 1, 1)}, {"theirs", better}}));
   EXPECT_EQ(copies_.find("mine")->hub, kHere);
   const auto lost = copies_.take_lost();
@@ -159,17 +160,49 @@ TEST_F(NameCopiesTest, TellsWhichOwnNamesAreLostToABetterClaim) {
 
 TEST_F(NameCopiesTest, LosesNothingToAHubThatIsAwayBeforeItIsBack) {
   auto better = node_claim(2, 1, 1);
-  better.rank = 9;
+  better.rank = kOrdinaryRank + 9;
   (void)copies_.take(names(0, 1, {{"a", better}}));
   (void)copies_.set_reachable({}, milliseconds(0));
   copies_.put_own("a", node_claim(1, 1));
   EXPECT_EQ(copies_.find("a")->hub, kHere);
-  EXPECT_EQ(copies_.find("a")->claim->rank, 10u) << "it takes over";
+  EXPECT_EQ(copies_.find("a")->claim->rank, kOrdinaryRank + 8);
   EXPECT_TRUE(copies_.take_lost().empty());
   copies_.remove_own("a");
   (void)copies_.set_reachable(runs(), milliseconds(1));
   copies_.put_own("a", node_claim(1, 1));
   EXPECT_EQ(copies_.take_lost().size(), 1u) << "one that is held is not taken over";
+}
+
+TEST_F(NameCopiesTest, WhoeverStandsAtAHubThatCouldNotBeReachedKeepsTheName) {
+  (void)copies_.take(names(0, 1, {{"a", node_claim(2, 1, 1)}}));
+  (void)copies_.set_reachable({}, milliseconds(0));
+  for (const std::uint32_t node : {1, 2, 3}) {
+    copies_.put_own("a", node_claim(1, node));
+    EXPECT_EQ(copies_.find("a")->claim->rank, kOrdinaryRank - 1) << "however often it is taken";
+  }
+  (void)copies_.set_reachable(runs(), milliseconds(1));
+  EXPECT_EQ(copies_.take_lost().size(), 1u);
+  EXPECT_EQ(copies_.find("a")->hub, kThere);
+}
+
+TEST_F(NameCopiesTest, ANodeThatIsAwayGivesWayToOneThatIsThereWhateverItsRank) {
+  auto mine = node_claim(1, 1);
+  auto theirs = node_claim(2, 1, 1);
+  theirs.rank = 0;
+  copies_.put_own("a", mine);
+  (void)copies_.take(names(0, 1, {{"a", theirs}}));
+  EXPECT_TRUE(copies_.take_lost().empty());
+  mine.state = NameState::away;
+  copies_.put_own("a", mine);
+  EXPECT_EQ(copies_.take_lost().size(), 1u);
+  EXPECT_EQ(copies_.find("a")->hub, kThere);
+  mine.state = NameState::held;
+  copies_.put_own("a", mine);
+  theirs = node_claim(2, 1, 2);
+  theirs.rank = kOrdinaryRank + 9;
+  theirs.state = NameState::away;
+  (void)copies_.take(names(1, 2, {{"a", theirs}}));
+  EXPECT_TRUE(copies_.take_lost().empty());
 }
 
 TEST_F(NameCopiesTest, AServiceGivesWayToANodeAndToNoService) {

@@ -66,10 +66,14 @@ TEST(NameIndex, OfTwoClaimsTheSameOneWinsFromBothSides) {
   const auto low = node_claim(1, 5, 1);
   const auto high = node_claim(2, 5, 1);
   auto taken_over = node_claim(3, 5, 1);
-  taken_over.rank = 2;
+  taken_over.rank = proto::route::kOrdinaryRank + 1;
+  auto away = taken_over;
+  away.state = proto::route::NameState::away;
   const auto service = service_claim(1, 1, 1, 1);
   EXPECT_TRUE(wins(low, high) && !wins(high, low));
   EXPECT_TRUE(wins(taken_over, low) && !wins(low, taken_over));
+  EXPECT_TRUE(wins(low, away) && !wins(away, low));
+  EXPECT_TRUE(wins(away, service) && !wins(service, away));
   EXPECT_TRUE(wins(high, service) && !wins(service, high));
 }
 
