@@ -151,8 +151,8 @@ constexpr std::array kTable{
               "hub; one node may have half of it",
               false, true},
     LimitInfo{"names_bytes", "bytes", &Limits::names_bytes, kMiB, 64 * kGiB,
-              "names of nodes and services of all linked hubs: each takes 288 bytes and its text; "
-              "beyond, no names of other hubs are taken, and own nodes get no new ones",
+              "names of nodes and services of all other hubs: each takes 288 bytes and its text; "
+              "one hub may have half of it; beyond, no further names are taken of a hub",
               false, true},
     LimitInfo{"page_records", "records", &Limits::page_records, 1, 1'000,
               "in one answer to LIST and the like", true},

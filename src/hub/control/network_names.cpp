@@ -13,6 +13,14 @@ namespace route = proto::route;
 using proto::ns::ChangeKind;
 using std::chrono::milliseconds;
 
+constexpr milliseconds kShortagePause = std::chrono::minutes(1);
+
+std::string hub_text(const NameCopies& copies, HubId hub) {
+  const std::string_view name = copies.hub_name(hub);
+  return "hub " + std::to_string(hub.value()) +
+         (name.empty() ? "" : " (" + escaped(name, kQuotedMax) + ")");
+}
+
 }  // namespace
 
 void NetworkNames::begin_connection(LinkNumber number, milliseconds now) {
@@ -102,6 +110,7 @@ std::optional<milliseconds> NetworkNames::next_due() const {
 
 void NetworkNames::settle(milliseconds now, Effects& effects) {
   if (!exchange_) return;
+  log_shortage(now);
   // The look-ups are valid until a name changes: the effects say so only later.
   for (const KnownName& winner : exchange_->take_lost()) let_go(winner, now, effects);
   for (const std::string& name : std::exchange(withdrawn_, {})) {
@@ -124,6 +133,23 @@ void NetworkNames::settle(milliseconds now, Effects& effects) {
       parts_.membership.topics().note_moved(name, away_service(name), now, effects);
     parts_.watches.begin_again();
   }
+}
+
+void NetworkNames::log_shortage(milliseconds now) {
+  const NameCopies& copies = exchange_->copies();
+  const auto starved = copies.starved();
+  if (!starved || copies.refused() == logged_refusals_) return;
+  if (shortage_logged_at_ && now < *shortage_logged_at_ + kShortagePause) return;
+  shortage_logged_at_ = now;
+  logged_refusals_ = copies.refused();
+  const HubId largest = copies.largest();
+  log_warning("no room for all names of " + hub_text(copies, *starved) + ": names of other hubs have " +
+              std::to_string(copies.bytes_of_others()) + " of " +
+              std::to_string(parts_.limits.names_bytes) + " bytes (names_bytes), most of them " +
+              hub_text(copies, largest) + ", " +
+              std::to_string(copies.counts_of(largest).bytes) +
+              ", and one hub may have half; its nodes cannot be found by their names here; find out "
+              "why that hub has so many names, or raise names_bytes");
 }
 
 /// Links may want the group, whether nodes here do or not.

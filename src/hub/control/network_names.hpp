@@ -69,6 +69,8 @@ class NetworkNames {
   void begin();
   void put(const Session& session);
   void put(const Topic& topic);
+  /// At most once a minute.
+  void log_shortage(std::chrono::milliseconds now);
   void note_service(const NameChange& change, std::chrono::milliseconds now, Effects& effects);
   void let_go(const KnownName& winner, std::chrono::milliseconds now, Effects& effects);
 
@@ -77,6 +79,8 @@ class NetworkNames {
   /// Own services that ended: another hub may have one of that name. Limit: those of one settle().
   std::vector<std::string> withdrawn_;
   std::uint64_t dropped_copies_ = 0;  ///< that those who watch were told of
+  std::uint64_t logged_refusals_ = 0;
+  std::optional<std::chrono::milliseconds> shortage_logged_at_;
 };
 
 }  // namespace gimnet::hub

@@ -175,22 +175,24 @@ TEST_F(NetworkNamesTest, AnotherHubsNodesAreResolvedAndReversed) {
       << "of this hub's own names";
 }
 
-TEST_F(NetworkNamesTest, TakesNoMoreNewNamesThanThereIsRoomFor) {
+TEST_F(NetworkNamesTest, NamesOfAnotherHubThatDoNotFitAreToldAndStopNoOwnOnes) {
   here_.limits.names_bytes = 1 << 20;
   connect();
-  std::size_t joined = 0;
-  for (bool room = true; room && joined < 10'000;) {
-    JoinRequest request;
-    request.name = std::string(200, 'n') + std::to_string(joined);
-    request.identity = Identity::open();
-    Effects effects;
-    room = static_cast<bool>(here_.membership.join(request, here_.now, effects));
-    here_.carry_out(effects);
-    joined += room ? 1 : 0;
-  }
-  EXPECT_GT(joined, 1'000u);
-  EXPECT_LT(joined, std::size_t{1 << 20} / 288);
-  there_.join("robot");  // whose hub has room
+  for (int i = 0; i < 2'000; ++i) there_.join(std::string(200, 'n') + std::to_string(i));
+  set_log_level(LogLevel::warning);
+  testing::internal::CaptureStderr();
+  settle();
+  here_.now += 59s;
+  there_.join("one/more");
+  settle();
+  const std::string logged = testing::internal::GetCapturedStderr();
+  EXPECT_NE(logged.find("no room for all names of hub 9 (far)"), std::string::npos) << logged;
+  EXPECT_EQ(logged.find("no room"), logged.rfind("no room")) << "once a minute";
+  const Session& own = here_.join("own");
+  EXPECT_EQ(own.name, "own");
+  const auto denied = here_.ask<ns::ResolveAnswer>(handle_resolve, own, ns::Resolve{"one/more"});
+  ASSERT_FALSE(denied);
+  EXPECT_NE(denied.error().sentence.find("names_bytes"), std::string::npos);
 }
 
 TEST_F(NetworkNamesTest, ANodeThatIsAwayOrUnreachableIsSaidToBe) {

@@ -54,6 +54,8 @@ std::optional<KnownName> find_elsewhere(const HandlerContext& context, const Req
 Result<ns::ResolveAnswer, proto::Refusal> resolve(const HandlerContext& context,
                                                   const Request& request, const std::string& name) {
   const bool learning = context.names != nullptr && context.names->is_learning(context.now);
+  const NameCopies* copies = context.names == nullptr ? nullptr : context.names->copies();
+  const bool starved = copies != nullptr && copies->starved();
   if (const auto known = find_elsewhere(context, request, name))
     return ns::ResolveAnswer{known->claim->node, known->standing, learning};
   if (const auto index = context.membership.directory().find(name)) {
@@ -72,7 +74,10 @@ Result<ns::ResolveAnswer, proto::Refusal> resolve(const HandlerContext& context,
                             "'; `gimnet nodes` shows those that are there" +
                             (learning ? "; a link came up a moment ago, and names of other hubs "
                                         "may be on their way: try again"
-                                      : ""),
+                                      : "") +
+                            (starved ? "; this hub has no room for all names of other hubs "
+                                       "(names_bytes): ask that node's hub, or use its id"
+                                     : ""),
                         learning};
 }
 

@@ -76,11 +76,6 @@ std::optional<Goodbye> Directory::network_refusal(std::string_view name, const C
                                                   milliseconds now) const {
   if (network_ == nullptr) return std::nullopt;
   const auto known = network_->find(name);
-  if (!known && network_->is_full()) {
-    return Goodbye{GoodbyeCode::hub_full,
-                   "the names of all hubs together are as many as this hub has room for "
-                   "(network_bytes); go on without a name, or try again later"};
-  }
   if (!known || known->hub == network_->self().hub) return std::nullopt;
   if (known->claim->service)
     return taken(quoted(name) + "is the full name of a service of " + holder_of(*known));

@@ -122,9 +122,8 @@ std::optional<proto::Refusal> Membership::rename(Session& session, const std::st
   if (name == session.name) return std::nullopt;
   if (!name.empty()) {
     if (const std::optional<proto::Goodbye> refusal = directory_.refusal(name, {&session}, now)) {
-      const proto::Status status = refusal->code == GoodbyeCode::name_taken ? proto::Status::taken
-                                   : refusal->code == GoodbyeCode::hub_full
-                                       ? proto::Status::limit
+      const proto::Status status = refusal->code == GoodbyeCode::name_taken
+                                       ? proto::Status::taken
                                        : proto::Status::bad_request;
       return proto::Refusal{status, refusal->sentence};
     }

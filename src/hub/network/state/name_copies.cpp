@@ -212,7 +212,7 @@ NameCopies::Taken NameCopies::take(const route::Names& names) {
   for (const route::NameRecord& each : names.records) {
     if (!index_.find(each.name, names.hub)) growth += NameIndex::count_of(each.name);
   }
-  if (growth > 0 && bytes() + growth > options_.bytes_max) {
+  if (growth > 0 && !has_room(names.hub, growth)) {
     copy->starved = true;
     ++refused_;
     return Taken::full;
@@ -359,11 +359,28 @@ std::optional<route::NamesKnown::Entry> NameCopies::known(HubId hub) const {
 /// Room is an eighth of all, so that a copy that does not fit is not asked for again and again.
 std::vector<HubId> NameCopies::take_starved() {
   std::vector<HubId> starved;
-  if (bytes() > options_.bytes_max - options_.bytes_max / 8) return starved;
   for (auto& [hub, copy] : copies_) {
-    if (std::exchange(copy.starved, false)) starved.push_back(hub);
+    if (!copy.starved || !has_room(hub, options_.bytes_max / 8)) continue;
+    copy.starved = false;
+    starved.push_back(hub);
   }
   return starved;
+}
+
+std::optional<HubId> NameCopies::starved() const {
+  const auto found = std::ranges::find_if(copies_, [](const auto& each) {
+    return each.second.starved;
+  });
+  return found == copies_.end() ? std::nullopt : std::optional{found->first};
+}
+
+HubId NameCopies::largest() const {
+  HubId largest{};
+  for (const auto& [hub, copy] : copies_) {
+    if (hub == options_.self.hub) continue;
+    if (largest == HubId{} || counts_of(hub).bytes > counts_of(largest).bytes) largest = hub;
+  }
+  return largest;
 }
 
 std::optional<KnownName> NameCopies::find(std::string_view name) const {

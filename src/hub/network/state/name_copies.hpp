@@ -63,8 +63,9 @@ struct NamesPosition {
 /// hub that can be reached. A copy is complete up to a version: it has each name that changed last
 /// up to there as it is now. So what changed in a range of versions extends every copy that is
 /// complete up to the begin of the range, from whichever link it comes. Thread safety: none. Time
-/// is an argument. Limits: Options::bytes_max for all names; of deleted names as many as of living
-/// ones of that hub, and kMarksLeast more.
+/// is an argument. Limits: Options::bytes_max for the names of all other hubs, half of it for those
+/// of one; of deleted names as many as of living ones of that hub, and kMarksLeast more. Own names
+/// are bounded by those who put them.
 class NameCopies {
  public:
   struct Options {
@@ -90,8 +91,6 @@ class NameCopies {
   /// Own names that a hub that can be reached has a better claim to, since the last call. The
   /// caller lets go of them, which it says by remove_own().
   [[nodiscard]] std::vector<KnownName> take_lost();
-  /// There is no room for further names.
-  [[nodiscard]] bool is_full() const { return bytes() >= options_.bytes_max; }
 
   // Copies
 
@@ -115,7 +114,7 @@ class NameCopies {
   enum class Taken : std::uint8_t {
     changed,
     known,  ///< nothing new, or of a process of which there is no copy, or not what follows
-    full,   ///< there is no room: starved() names the hub
+    full,   ///< there is no room
   };
   Taken take(const proto::route::Names& names);
   /// The next message for a receiver that is at that place, which it moves. Nothing: it has all.
@@ -125,6 +124,14 @@ class NameCopies {
   [[nodiscard]] std::optional<proto::route::NamesKnown::Entry> known(HubId hub) const;
   /// Hubs whose names did not fit when they came, once there is room again.
   [[nodiscard]] std::vector<HubId> take_starved();
+  /// Not all names of that hub fit, and there is still no room. Nothing: all names are here.
+  [[nodiscard]] std::optional<HubId> starved() const;
+  /// The other hub of which this one has most bytes of names. REQUIRES: there is another hub.
+  [[nodiscard]] HubId largest() const;
+  /// Of the names of all other hubs.
+  [[nodiscard]] std::size_t bytes_of_others() const {
+    return bytes() - counts_of(options_.self.hub).bytes;
+  }
 
   // Look-ups, among all hubs
 
@@ -184,6 +191,12 @@ class NameCopies {
   void forget_marks(Copy& copy);
   /// Makes room at the id that the claim has. False: a newer name has it.
   [[nodiscard]] bool evict(Copy& copy, std::string_view name, const proto::route::NameClaim& claim);
+  /// Has that other hub room for so many bytes more? It has at most half of all, whatever it sends,
+  /// so that there is room for others.
+  [[nodiscard]] bool has_room(HubId hub, std::size_t bytes) const {
+    return counts_of(hub).bytes + bytes <= options_.bytes_max / 2 &&
+           bytes_of_others() + bytes <= options_.bytes_max;
+  }
   [[nodiscard]] std::uint32_t rank_for(std::string_view name, NodeId node) const;
   [[nodiscard]] bool is_lost_to(const KnownName& other) const;
   void compare_with_own(std::string_view name);

@@ -41,41 +41,46 @@ std::vector<NameIndex::Place> NameIndex::live_of(HubId hub) const {
 
 NameIndex::Place NameIndex::put(std::string_view name, HubId hub, const NameClaim& claim) {
   auto place = claims_.find(KeyView{name, hub});
+  Counts& counts = counts_[hub];
   if (place == claims_.end()) {
     place = claims_.try_emplace(Key{std::string{name}, hub}).first;
     bytes_ += count_of(name);
+    counts.bytes += count_of(name);
   } else {
-    forget_id(place->second);
+    forget_id(*place);
   }
   place->second = claim;
   if (claim.state == NameState::deleted) return place;
   if (claim.service) {
     groups_[claim.service->group] = place;
-    ++counts_[hub_of(claim.node)].services;
+    ++counts.services;
   } else {
     nodes_[claim.node] = place;
-    ++counts_[hub_of(claim.node)].nodes;
+    ++counts.nodes;
   }
   return place;
 }
 
 void NameIndex::erase(Place place) {
-  forget_id(place->second);
+  forget_id(*place);
+  const auto counts = counts_.find(place->first.hub);
   bytes_ -= count_of(place->first.name);
+  counts->second.bytes -= count_of(place->first.name);
+  if (counts->second.bytes == 0) counts_.erase(counts);
   claims_.erase(place);
 }
 
-void NameIndex::forget_id(const NameClaim& claim) {
+void NameIndex::forget_id(const Claims::value_type& entry) {
+  const auto& [key, claim] = entry;
   if (claim.state == NameState::deleted) return;
-  const auto counts = counts_.find(hub_of(claim.node));
+  Counts& counts = counts_.at(key.hub);
   if (claim.service) {
     groups_.erase(claim.service->group);
-    --counts->second.services;
+    --counts.services;
   } else {
     nodes_.erase(claim.node);
-    --counts->second.nodes;
+    --counts.nodes;
   }
-  if (counts->second.nodes == 0 && counts->second.services == 0) counts_.erase(counts);
 }
 
 }  // namespace gimnet::hub

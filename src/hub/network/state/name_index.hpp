@@ -57,10 +57,10 @@ class NameIndex {
   /// The living claim that has this one's node id, or its group id.
   [[nodiscard]] std::optional<Place> holder(const proto::route::NameClaim& claim) const;
   struct Counts {
-    std::uint32_t nodes = 0;
-    std::uint32_t services = 0;
+    std::uint32_t nodes = 0;     ///< that have a name
+    std::uint32_t services = 0;  ///< living ones, as the nodes
+    std::size_t bytes = 0;       ///< of all its claims, as count_of() counts
   };
-  /// Living claims of a hub: its nodes that have a name, and its services.
   [[nodiscard]] Counts counts_of(HubId hub) const {
     const auto found = counts_.find(hub);
     return found == counts_.end() ? Counts{} : found->second;
@@ -79,7 +79,7 @@ class NameIndex {
   [[nodiscard]] std::size_t bytes() const { return bytes_; }
 
  private:
-  void forget_id(const proto::route::NameClaim& claim);
+  void forget_id(const Claims::value_type& entry);
 
   mutable Claims claims_;  // find() gives places that may be changed
   std::map<NodeId, Place> nodes_;

@@ -213,27 +213,43 @@ TEST_F(NameCopiesTest, AServiceGivesWayToANodeAndToNoService) {
   EXPECT_EQ(copies_.take_lost().size(), 1u);
 }
 
-TEST_F(NameCopiesTest, RefusesWhatHasNoRoomUntilThereIsSome) {
-  std::uint64_t version = 0;
-  const std::string text(200, 'n');
-  const auto one_more = [&] {
-    ++version;
-    return copies_.take(names(version - 1, version,
-                              {{text + std::to_string(version),
-                                node_claim(2, static_cast<std::uint32_t>(version), version)}}));
+TEST_F(NameCopiesTest, TakesHalfOfAllNamesFromOneHubAndNoMore) {
+  constexpr std::size_t kNameBytes = 512;
+  constexpr std::uint32_t kMost = (std::uint32_t{1} << 20) / 2 / kNameBytes;
+  const auto fill = [&](HubId hub, std::uint32_t more) {
+    std::uint64_t version = copies_.known(hub)->version;
+    for (; more > 0; --more) {
+      std::string name = std::to_string(++version);
+      name.insert(0, kNameBytes - NameIndex::kClaimBytes - name.size(), 'n');
+      const auto claim = node_claim(hub.value(), static_cast<std::uint32_t>(version), version);
+      const Names one{hub, kFirst, version - 1, version, 0, {{name, claim}}};
+      if (copies_.take(one) != NameCopies::Taken::changed) break;
+    }
+    return more;
   };
-  while (one_more() == NameCopies::Taken::changed) {
-  }
-  EXPECT_LE(copies_.bytes(), options().bytes_max);
-  EXPECT_EQ(copies_.refused(), 1u);
-  EXPECT_EQ(copies_.known(kThere)->version, version - 1);
+  constexpr HubId kThird{3};
+  constexpr HubId kFourth{4};
+  (void)copies_.set_reachable(
+      std::vector<HubRun>{{kThere, kFirst}, {kThird, kFirst}, {kFourth, kFirst}}, milliseconds(0));
+  copies_.put_own(std::string(200, 'o'), node_claim(1, 1));
+  EXPECT_EQ(fill(kThere, kMost), 0u);
+  EXPECT_FALSE(copies_.starved());
+  EXPECT_EQ(fill(kThere, 1), 1u) << "one beyond";
+  EXPECT_EQ(copies_.known(kThere)->version, kMost);
+  EXPECT_EQ(copies_.starved(), kThere);
+  EXPECT_EQ(fill(kThird, kMost + 1), 1u) << "others have room, and own names take none";
+  EXPECT_EQ(copies_.bytes_of_others(), options().bytes_max);
+  EXPECT_EQ(fill(kFourth, 1), 1u);
+  EXPECT_EQ(copies_.refused(), 3u);
+  EXPECT_EQ(copies_.largest(), kThere);
   EXPECT_TRUE(copies_.take_starved().empty());
-  EXPECT_EQ(copies_.take(names(version - 1, version, {{text + "1", test::mark(version)}})),
-            NameCopies::Taken::changed)
-      << "a mark needs no room";
-  (void)copies_.set_reachable(std::vector<HubRun>{{kThere, kSecond}}, milliseconds(0));
+  Names mark{kThere, kFirst, kMost, kMost + 1, 0, {{"", test::mark(kMost + 1)}}};
+  mark.records[0].name = copies_.find_node(make_id<NodeId>(kThere, 1))->name;
+  EXPECT_EQ(copies_.take(mark), NameCopies::Taken::changed) << "a mark needs no room";
+  (void)copies_.set_reachable(std::vector<HubRun>{{kThere, kFirst}, {kFourth, kFirst}},
+                              milliseconds(0));
   (void)copies_.forget(kGrace);
-  EXPECT_EQ(copies_.bytes(), 0u);
+  EXPECT_EQ(copies_.take_starved(), std::vector<HubId>{kFourth}) << "the other one has its share";
 }
 
 TEST_F(NameCopiesTest, KeepsOneNameOfEachVersionAndOfEachId) {

@@ -57,8 +57,13 @@ TEST(NameIndex, CountsWhatEachHubHas) {
   EXPECT_EQ(index.counts_of(HubId{2}).nodes, 1u);
   EXPECT_EQ(index.counts_of(HubId{2}).services, 1u);
   EXPECT_EQ(index.counts_of(HubId{3}).nodes, 1u);
-  index.put("robot", HubId{2}, test::mark(4));
+  EXPECT_EQ(index.counts_of(HubId{3}).bytes, NameIndex::count_of("other"));
+  const auto mark = index.put("robot", HubId{2}, test::mark(4));
   EXPECT_EQ(index.counts_of(HubId{2}).nodes, 0u);
+  EXPECT_EQ(index.counts_of(HubId{2}).bytes,
+            NameIndex::count_of("robot") + NameIndex::count_of("robot/laser"));
+  index.erase(mark);
+  EXPECT_EQ(index.counts_of(HubId{2}).bytes, NameIndex::count_of("robot/laser"));
   EXPECT_EQ(index.counts_of(HubId{4}).nodes, 0u);
 }
 
