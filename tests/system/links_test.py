@@ -307,6 +307,8 @@ class Between(unittest.TestCase):
         self.assertRegex(taken.err, "the name 'B' is that of node 1[.][0-9]+ of hub 1, which cannot be reached; it is free in [0-9]+ s")
         (hub,) = [hub for hub in json.loads(run_gimnet(second, "hubs", "--json").out) if hub["id"] == 1]
         self.assertEqual((hub["reachable"], hub["distance"], hub["cost"], hub["via"]), (False, None, None, None))
+        status = json.loads(run_gimnet(second, "status", "--all", "--json").out)
+        self.assertEqual((status["exact"], status["hubs"][0]), (False, {"id": 1, "name": "hub-1", "error": "unreachable"}))
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@
 #include <unordered_map>
 
 #include "tools/gimnet/json_writer.hpp"
-#include "tools/gimnet/network.hpp"
+#include "tools/gimnet/member_status.hpp"
 #include "tools/gimnet/session.hpp"
 #include "tools/gimnet/table.hpp"
 #include "tools/gimnet/watch.hpp"

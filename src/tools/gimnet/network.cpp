@@ -5,7 +5,6 @@
 #include <map>
 #include <utility>
 
-#include "base/clock.hpp"
 #include "base/ids.hpp"
 #include "tools/gimnet/session.hpp"
 
@@ -206,68 +205,6 @@ std::string graph_ascii(const std::vector<NetworkHub>& hubs) {
 
 namespace {
 
-/// The record that the hub at the other end has of the same link; nullptr: none.
-const LinkRecord* other_end(const std::vector<MemberStatus>& members, std::uint32_t hub,
-                            const LinkRecord& link) {
-  const auto other = std::ranges::find(members, link.hub_id, &MemberStatus::hub_id);
-  if (other == members.end()) return nullptr;
-  const auto same = std::ranges::find_if(other->links, [&](const LinkRecord& candidate) {
-    return candidate.hub_id == hub && candidate.name == link.name &&
-           candidate.dialled != link.dialled;
-  });
-  return same == other->links.end() ? nullptr : &*same;
-}
-
-}  // namespace
-
-bool links_agree(const std::vector<MemberStatus>& members) {
-  for (const MemberStatus& member : members) {
-    if (!member.error.empty()) return false;
-    for (const LinkRecord& link : member.links) {
-      if (link.hub_id == 0) continue;  // it never came about
-      const LinkRecord* const other = other_end(members, member.hub_id, link);
-      if (other == nullptr || link.delivered > other->accepted ||
-          other->accepted > link.delivered + link.unsure)
-        return false;
-    }
-  }
-  return true;
-}
-
-std::string json_of(const std::vector<MemberStatus>& members, bool exact) {
-  JsonWriter json;
-  json.begin_object().member("exact", exact).key("hubs").begin_array();
-  for (const MemberStatus& member : members) {
-    json.begin_object().member("id", member.hub_id).member("name", member.name);
-    if (member.error.empty()) {
-      write(json.key("ledger"), member.ledger);
-      write(json.key("links"), member.links);
-    } else {
-      json.member("error", member.error);
-    }
-    json.end_object();
-  }
-  return json.end_array().end_object().str() + "\n";
-}
-
-std::string text_of(const std::vector<MemberStatus>& members, bool exact, Paint paint) {
-  std::string text;
-  for (const MemberStatus& member : members) {
-    text += "hub " + std::to_string(member.hub_id) + " " + printable(member.name) + ": ";
-    if (!member.error.empty()) {
-      text += paint(printable(member.error), Tone::bad) + "\n\n";
-      continue;
-    }
-    text += text_of(member.ledger) + "\n";
-    if (!member.links.empty()) text += text_of(member.links, paint);
-    text += "\n";
-  }
-  return text + (exact ? "the counts of all links agree\n"
-                       : "the counts of links do not agree (frames may be on their way)\n");
-}
-
-namespace {
-
 /// Ends a command that asks one hub of the network.
 template <class Records>
 ExitCode show(ToolSession& session, const Outcome<Records>& found) {
@@ -278,10 +215,6 @@ ExitCode show(ToolSession& session, const Outcome<Records>& found) {
 }
 
 constexpr Timeout kPatience{5000};
-/// The last frames of a link are confirmed with its keep-alive (250 ms), so counts of links that
-/// have just become idle agree a moment later.
-constexpr std::int64_t kSettledWithinNs = 1'000'000'000;
-constexpr std::int64_t kAskAgainAfterNs = 100'000'000;
 /// More hubs than any way has.
 constexpr std::size_t kWayMax = 64;
 
@@ -312,31 +245,6 @@ Outcome<std::vector<RouteStep>> way_to(ToolSession& session, std::uint32_t targe
     at = found->next_hop;
   }
   return way;
-}
-
-/// One answer of each hub that can be reached.
-Outcome<std::vector<MemberStatus>> ask_all(ToolSession& session) {
-  const auto hubs = session.node().hubs(kPatience);
-  if (!hubs) return hubs.failure();
-  std::vector<MemberStatus> members;
-  for (const NetworkHub& hub : *hubs) {
-    if (!hub.reachable || hub.too_far || session.stopped()) continue;
-    MemberStatus& member = members.emplace_back();
-    member.hub_id = hub.hub_id;
-    member.name = hub.name;
-    const std::uint32_t whom = hub.distance == 0 ? 0 : hub.hub_id;
-    const auto counters = session.node().hub_counters(kPatience, whom);
-    const auto links = session.node().hub_links(kPatience, whom);
-    if (!counters) {
-      member.error = counters.failure().sentence;
-    } else if (!links) {
-      member.error = links.failure().sentence;
-    } else {
-      member.ledger = ledger_of(summed(*counters));
-      member.links = *links;
-    }
-  }
-  return members;
 }
 
 }  // namespace
@@ -375,23 +283,6 @@ ExitCode run_graph(ToolSession& session) {
   session.output().write(options.json  ? graph_json(*hubs)
                          : options.dot ? graph_dot(*hubs)
                                        : graph_ascii(*hubs));
-  return session.finish();
-}
-
-ExitCode run_status_of_all(ToolSession& session) {
-  auto members = ask_all(session);
-  bool exact = false;
-  const std::int64_t until = steady_now_ns() + kSettledWithinNs;
-  while (members && !exact) {
-    const bool agreed = links_agree(*members);
-    members = ask_all(session);
-    exact = members && agreed && links_agree(*members);
-    const std::int64_t next = steady_now_ns() + kAskAgainAfterNs;
-    if (!exact && (next > until || !session.stop().wait_until(next))) break;
-  }
-  if (!members) return session.fail(members.failure());
-  session.output().write(session.options().json ? json_of(*members, exact)
-                                                : text_of(*members, exact, session.paint()));
   return session.finish();
 }
 

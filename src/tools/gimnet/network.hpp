@@ -5,7 +5,6 @@
 
 #include "gimnet/gimi/records.hpp"
 #include "tools/gimnet/exit_code.hpp"
-#include "tools/gimnet/hub_status.hpp"
 #include "tools/gimnet/json_writer.hpp"
 #include "tools/gimnet/table.hpp"
 
@@ -48,26 +47,9 @@ struct GraphEdge {
 /// A line for each hub: `7 lab -- 8 (10), 9 (60)`.
 [[nodiscard]] std::string graph_ascii(const std::vector<NetworkHub>& hubs);
 
-/// One hub of the network, as it tells of itself.
-struct MemberStatus {
-  std::uint32_t hub_id = 0;
-  std::string name;
-  Ledger ledger;
-  std::vector<LinkRecord> links;
-  std::string error;  ///< it could not be asked; "": it was
-};
-/// Is delivered(A) <= accepted(B) <= delivered(A) + unsure(A) true for each link, in both ways? A
-/// link is found at both ends by its name.
-[[nodiscard]] bool links_agree(const std::vector<MemberStatus>& members);
-[[nodiscard]] std::string json_of(const std::vector<MemberStatus>& members, bool exact);
-[[nodiscard]] std::string text_of(const std::vector<MemberStatus>& members, bool exact,
-                                  Paint paint = Paint{});
-
 [[nodiscard]] ExitCode run_hubs(ToolSession& session);
 [[nodiscard]] ExitCode run_links(ToolSession& session);
 [[nodiscard]] ExitCode run_routes(ToolSession& session);
 [[nodiscard]] ExitCode run_graph(ToolSession& session);
-/// `status --all`. REQUIRES: the session joined.
-[[nodiscard]] ExitCode run_status_of_all(ToolSession& session);
 
 }  // namespace gimnet::tool
