@@ -131,7 +131,7 @@ class Groups(Chain):
 
         viewer = self.viewer(self.last, "viewer")
         of_one = bytes_of_twenty(viewer)
-        for number in range(25):
+        for number in range(99):
             self.stranger(self.last, f"more-{number}").subscribe("robot/scan")
         # Signs of life of the link come between: less than half a message.
         self.assertLess(abs(bytes_of_twenty(viewer) - of_one), 2500)
