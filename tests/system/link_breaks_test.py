@@ -108,8 +108,9 @@ class Breaks(unittest.TestCase):
         for _ in range(5 if FULL else 1):
             order("cut")
             self.until_more()
-            order("stall 1500ms")  # longer than a link may be silent
+            order("stall")  # until the link was silent too long: its next connection stands still, too, and is seen
             self.until_silent(last)
+            order("go")
             self.until_more()
             first.process.signal(signal.SIGSTOP)
             self.until_silent(last)
