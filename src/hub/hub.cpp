@@ -254,9 +254,8 @@ Result<std::unique_ptr<Hub>> Hub::start(const HubOptions& options, const ConfigS
                    .address = asked_for.front(),
                    .wall = wall});
   if (!state) return state.error();
-  std::unique_ptr<Hub> hub(
-      new Hub(std::make_unique<Parts>(options, former, sources, std::move(*state),
-                                      std::move(listeners))));
+  std::unique_ptr<Hub> hub(new Hub(
+      std::make_unique<Parts>(options, former, sources, std::move(*state), std::move(listeners))));
   hub->parts_->shards.start();
   return hub;
 }

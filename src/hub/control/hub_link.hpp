@@ -146,7 +146,7 @@ class HubLink {
   std::optional<std::chrono::milliseconds> asked_at_;  ///< whether it is alive
   std::int64_t heard_sent_ns_ = 0;                     ///< of the last keep-alive heard; 0: none
   std::int64_t heard_ns_ = 0;
-  std::uint16_t configured_cost_ = 0;                  ///< by the side that dialled; 0: measured
+  std::uint16_t configured_cost_ = 0;  ///< by the side that dialled; 0: measured
   LinkCost cost_;
   LinkClock clock_;
   std::array<ClockSample, kClockSamples> clock_samples_;

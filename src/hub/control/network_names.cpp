@@ -143,13 +143,13 @@ void NetworkNames::log_shortage(milliseconds now) {
   shortage_logged_at_ = now;
   logged_refusals_ = copies.refused();
   const HubId largest = copies.largest();
-  log_warning("no room for all names of " + hub_text(copies, *starved) + ": names of other hubs have " +
-              std::to_string(copies.bytes_of_others()) + " of " +
-              std::to_string(parts_.limits.names_bytes) + " bytes (names_bytes), most of them " +
-              hub_text(copies, largest) + ", " +
-              std::to_string(copies.counts_of(largest).bytes) +
-              ", and one hub may have half; its nodes cannot be found by their names here; find out "
-              "why that hub has so many names, or raise names_bytes");
+  log_warning(
+      "no room for all names of " + hub_text(copies, *starved) + ": names of other hubs have " +
+      std::to_string(copies.bytes_of_others()) + " of " +
+      std::to_string(parts_.limits.names_bytes) + " bytes (names_bytes), most of them " +
+      hub_text(copies, largest) + ", " + std::to_string(copies.counts_of(largest).bytes) +
+      ", and one hub may have half; its nodes cannot be found by their names here; find out "
+      "why that hub has so many names, or raise names_bytes");
 }
 
 /// Links may want the group, whether nodes here do or not.

@@ -164,8 +164,8 @@ TEST(Links, AHubThatLosesItsIdSaysWhereTheClaimCameFrom) {
   LinkedRigs hubs;
   hubs.link();
   // Hub 1 hears over its link that another hub 1, with a lower unique id, is behind hub 2.
-  const auto hear = [&hubs](proto::HubKey said_by, proto::HubInstance instance, proto::HubKey neighbour,
-                            std::string name) {
+  const auto hear = [&hubs](proto::HubKey said_by, proto::HubInstance instance,
+                            proto::HubKey neighbour, std::string name) {
     proto::route::RecordPart part;
     part.hub = said_by;
     part.instance = instance;

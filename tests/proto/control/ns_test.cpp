@@ -75,8 +75,20 @@ TEST(NsMessages, ListRecordsAsTheVectorsSay) {
   expect_answer("ns/list_answer", 3, list);
 
   ServicesAnswer services;
-  services.services = {{kGroup, "robot/odom", NodeId{0x00700011}, 3, 1, Direction::provides,
-                        Delivery::latest, "x y theta", 2, "lab", 0, false, 0, {}}};
+  services.services = {{kGroup,
+                        "robot/odom",
+                        NodeId{0x00700011},
+                        3,
+                        1,
+                        Direction::provides,
+                        Delivery::latest,
+                        "x y theta",
+                        2,
+                        "lab",
+                        0,
+                        false,
+                        0,
+                        {}}};
   expect_answer("ns/services_answer", 6, services);
 }
 

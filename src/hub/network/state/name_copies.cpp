@@ -368,9 +368,8 @@ std::vector<HubId> NameCopies::take_starved() {
 }
 
 std::optional<HubId> NameCopies::starved() const {
-  const auto found = std::ranges::find_if(copies_, [](const auto& each) {
-    return each.second.starved;
-  });
+  const auto found =
+      std::ranges::find_if(copies_, [](const auto& each) { return each.second.starved; });
   return found == copies_.end() ? std::nullopt : std::optional{found->first};
 }
 

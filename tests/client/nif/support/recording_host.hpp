@@ -81,9 +81,9 @@ class RecordingHost final : public InboundHost {
   std::vector<std::uint16_t> answers;
   std::vector<std::uint32_t> lost_groups;
   bool moved_is_news = true;
-  std::uint32_t counted_group = 0;     ///< its messages count in a window
-  std::uint32_t unwanted_group = 0;    ///< its messages may not wait ...
-  std::size_t unwanted_bytes_max = 0;  ///< ... if they have more bytes
+  std::uint32_t counted_group = 0;               ///< its messages count in a window
+  std::uint32_t unwanted_group = 0;              ///< its messages may not wait ...
+  std::size_t unwanted_bytes_max = 0;            ///< ... if they have more bytes
   std::optional<ReportedMessages::Start> start;  ///< of the message that reports are about
   std::vector<proto::Taken> taken_sent;
   std::vector<proto::Taken> taken_received;
