@@ -296,9 +296,14 @@ class Between(unittest.TestCase):
             node, service = [each[0]["state"] if each else None for each in found]
             return node if node == service else None
         wait_until(lambda: state() == "connected", "B at the other hub")
+        watch = start_gimnet(self, second, "watch", "--json")
+        wait_until(lambda: b'"B"' in watch.out, "B for all")
         first.process.signal(signal.SIGKILL)
         first.process.wait()
         wait_until(lambda: state() == "unreachable", "that B cannot be reached")
+        wait_until(lambda: b'"change":"unreachable","hub_id":1,"hub":"hub-1"' in watch.out, "the line of the watch")
+        present = run_gimnet(second, "watch", "B", "-n", "1")
+        self.assertRegex(present.out.decode(), "  present      node B 1[.][0-9]+, unreachable")
         ping = run_gimnet(second, "ping", "B", "-c", "1")
         self.assertEqual(ping.code, 4)
         self.assertIn("the node 'B' is unreachable: there is no way to its hub hub-1; `gimnet hubs` shows when", ping.err)
@@ -309,6 +314,8 @@ class Between(unittest.TestCase):
         self.assertEqual((hub["reachable"], hub["distance"], hub["cost"], hub["via"]), (False, None, None, None))
         status = json.loads(run_gimnet(second, "status", "--all", "--json").out)
         self.assertEqual((status["exact"], status["hubs"][0]), (False, {"id": 1, "name": "hub-1", "error": "unreachable"}))
+        first.again(self)
+        wait_until(lambda: b'"change":"reachable","hub_id":1' in watch.out, "that the hub can be reached again")
 
 
 if __name__ == "__main__":

@@ -346,7 +346,7 @@ class Watches(unittest.TestCase):
         self.assertIn(b"node robot 7.", waiting.out)
         again = run_gimnet(hub, "watch", "robot", "-n", "1")
         self.assertEqual(again.code, 0)
-        self.assertIn(b"  present     node robot 7.", again.out)
+        self.assertIn(b"  present      node robot 7.", again.out)
 
     def test_a_watch_that_the_hub_refuses_names_its_pattern_if_it_has_one(self):
         hub = Hub(self, "--limit", "watches=0")

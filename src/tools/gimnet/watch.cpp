@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/clock.hpp"
+#include "base/ids.hpp"
 #include "tools/gimnet/bounds.hpp"
 #include "tools/gimnet/json_writer.hpp"
 #include "tools/gimnet/session.hpp"
@@ -37,6 +38,13 @@ std::string time_text(std::int64_t ns) {
   return text.data();
 }
 
+/// `words` behind the time and the change.
+std::string line_of(std::int64_t now_ns, std::string change, const std::string& words) {
+  constexpr std::size_t kWidth = 11;
+  change.append(change.size() < kWidth ? kWidth - change.size() : 0, ' ');
+  return time_text(now_ns) + "  " + change + "  " + words;
+}
+
 std::string node_words(const NodeRecord& node, const std::string& former_name) {
   std::string words =
       "node " + (node.name.empty() ? std::string("-") : node.name) + " " + node.node.text();
@@ -54,9 +62,9 @@ std::string service_words(const ServiceRecord& service) {
 
 // Of what is gone the hub tells only who it was (docs/protocol.md, section 8): nothing else is said
 // here.
-void write_node(JsonWriter& json, const WatchEvent& event) {
+void write_node(JsonWriter& json, const WatchEvent& event, const HubWays& ways) {
   const NodeRecord& node = *event.node;
-  if (event.change != Change::left) return write(json, node);
+  if (event.change != Change::left) return write(json, node, ways.standing_of(node));
   json.begin_object()
       .member("id", node.node.text())
       .member("name", node.name)
@@ -86,12 +94,30 @@ bool ToolFilter::hides(const WatchEvent& event) {
   return hidden_.contains(id);
 }
 
+std::vector<NetworkHub> HubWays::take(const std::vector<NetworkHub>& hubs) {
+  std::vector<NetworkHub> changed;
+  std::map<std::uint32_t, bool> reachable;
+  for (const NetworkHub& hub : hubs) {
+    reachable[hub.hub_id] = hub.reachable;
+    const auto before = reachable_.find(hub.hub_id);
+    if (before != reachable_.end() && before->second != hub.reachable) changed.push_back(hub);
+  }
+  reachable_ = std::move(reachable);
+  return changed;
+}
+
+std::string_view HubWays::standing_of(const NodeRecord& node) const {
+  if (node.connected) return "connected";
+  const auto hub = reachable_.find(node.hub_id);
+  return hub == reachable_.end() || hub->second ? "away" : kUnreachable;
+}
+
 bool is_snapshot(Change change) {
   return change == Change::snapshot_begins || change == Change::present ||
          change == Change::snapshot_ends;
 }
 
-std::string json_line(const WatchEvent& event, std::int64_t now_ns) {
+std::string json_line(const WatchEvent& event, std::int64_t now_ns, const HubWays& ways) {
   std::string change(change_text(event.change));
   std::ranges::replace(change, ' ', '_');
   JsonWriter json;
@@ -99,19 +125,36 @@ std::string json_line(const WatchEvent& event, std::int64_t now_ns) {
   json.member("hub_id", event.hub_id).member("epoch", event.epoch).member("version", event.version);
   if (!event.former_name.empty()) json.member("former_name", event.former_name);
   if (!event.why.empty()) json.member("why", event.why);
-  if (event.node) write_node(json.key("node"), event);
+  if (event.node) write_node(json.key("node"), event, ways);
   if (event.service) write_service(json.key("service"), event);
   return json.end_object().str() + "\n";
 }
 
-std::string text_line(const WatchEvent& event, std::int64_t now_ns, Paint paint) {
+std::string text_line(const WatchEvent& event, std::int64_t now_ns, Paint paint,
+                      const HubWays& ways) {
   if (!event.node && !event.service) return {};
-  std::string change(change_text(event.change));
-  constexpr std::size_t kWidth = 10;
-  change.append(change.size() < kWidth ? kWidth - change.size() : 0, ' ');
-  const std::string words =
+  std::string words =
       event.node ? node_words(*event.node, event.former_name) : service_words(*event.service);
-  return paint(time_text(now_ns) + "  " + change + "  " + words, tone_of(event.change)) + "\n";
+  if (event.node && event.change == Change::present && !event.node->connected)
+    words += ", " + std::string(ways.standing_of(*event.node));
+  return paint(line_of(now_ns, std::string(change_text(event.change)), words),
+               tone_of(event.change)) +
+         "\n";
+}
+
+std::string json_line(const NetworkHub& hub, std::int64_t now_ns) {
+  JsonWriter json;
+  json.begin_object().member("time_ns", now_ns);
+  json.member("change", hub.reachable ? "reachable" : kUnreachable);
+  json.member("hub_id", hub.hub_id).member("hub", hub.name);
+  return json.end_object().str() + "\n";
+}
+
+std::string text_line(const NetworkHub& hub, std::int64_t now_ns, Paint paint) {
+  const std::string words = "hub " + std::to_string(hub.hub_id) + " " + printable(hub.name);
+  return paint(line_of(now_ns, hub.reachable ? "reachable" : kUnreachable, words),
+               hub.reachable ? Tone::plain : Tone::warning) +
+         "\n";
 }
 
 namespace {
@@ -122,16 +165,46 @@ void say_that_it_waits(const ToolOptions& options) {
       " yet; waiting");
 }
 
-/// Prints what is to be seen. True: it was an event that the user asked for.
-bool print(ToolSession& session, ToolFilter& filter, const WatchEvent& event) {
-  const ToolOptions& options = session.options();
-  if (!options.all && filter.hides(event)) return false;
-  if (options.changes && is_snapshot(event.change)) return false;
-  const std::int64_t now_ns = wall_now_ns();
-  session.output().write(options.json ? json_line(event, now_ns)
-                                      : text_line(event, now_ns, session.paint()));
-  return event.node.has_value() || event.service.has_value();
-}
+/// Prints what is to be seen. Thread safety: one thread.
+class WatchPrinter {
+ public:
+  explicit WatchPrinter(ToolSession& session) : session_(session) {}
+
+  /// True: it was an event that the user asked for.
+  bool print(const WatchEvent& event) {
+    const ToolOptions& options = session_.options();
+    if (!options.all && filter_.hides(event)) return false;
+    if (event.node) hubs_.insert(event.node->hub_id);
+    if (event.service) hubs_.insert(hub_of(NodeId{event.service->node.id}).value());
+    if (options.changes && is_snapshot(event.change)) return false;
+    const std::int64_t now_ns = wall_now_ns();
+    session_.output().write(options.json ? json_line(event, now_ns, ways_)
+                                         : text_line(event, now_ns, session_.paint(), ways_));
+    return event.node.has_value() || event.service.has_value();
+  }
+
+  /// Once a second, asks for ways to hubs, of which a watch does not tell, and prints those that
+  /// came or went for the nodes and services seen. `now_ns`: steady_now_ns().
+  void look_at_hubs(std::int64_t now_ns) {
+    if (now_ns < next_look_ns_ || !session_.node().state().connected) return;
+    next_look_ns_ = now_ns + 1'000'000'000;
+    const auto hubs = session_.node().hubs(ConnectionWatch::kPeriod);
+    if (!hubs) return;
+    for (const NetworkHub& hub : ways_.take(*hubs)) {
+      if (!hubs_.contains(hub.hub_id)) continue;
+      session_.output().write(session_.options().json
+                                  ? json_line(hub, wall_now_ns())
+                                  : text_line(hub, wall_now_ns(), session_.paint()));
+    }
+  }
+
+ private:
+  ToolSession& session_;
+  ToolFilter filter_;
+  HubWays ways_;
+  std::set<std::uint32_t> hubs_;  ///< of nodes and services that match
+  std::int64_t next_look_ns_ = 0;
+};
 
 }  // namespace
 
@@ -141,11 +214,12 @@ ExitCode run_watch(ToolSession& session) {
   if (!watch) return session.fail(watch.failure());
   const Bounds bounds(session.options());
   ConnectionWatch connection(session.node());
-  ToolFilter filter;
+  WatchPrinter printer(session);
   const ToolOptions& options = session.options();
   std::uint64_t events = 0;
   bool told = false;
   while (!bounds.enough(events) && !bounds.late() && session.output().ok()) {
+    printer.look_at_hubs(steady_now_ns());
     auto event = watch->receive(kNoWait);
     if (!event && event.is(Status::timeout)) {
       session.output().flush();
@@ -157,7 +231,7 @@ ExitCode run_watch(ToolSession& session) {
       connection.look_at_end();
       return session.fail(event.failure());
     }
-    if (print(session, filter, *event)) ++events;
+    if (printer.print(*event)) ++events;
     if (event->change == Change::snapshot_ends && events == 0 && !options.changes &&
         !std::exchange(told, true)) {
       say_that_it_waits(options);

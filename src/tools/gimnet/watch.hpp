@@ -1,8 +1,12 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
+#include <optional>
 #include <set>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "gimnet/gimi.hpp"
 #include "tools/gimnet/table.hpp"
@@ -23,13 +27,31 @@ class ToolFilter {
   std::set<std::uint32_t> hidden_;  ///< the last event of a node tells no more than its id
 };
 
+/// To which hubs of the network there is a way. Thread safety: one thread. Memory: an id for each
+/// hub.
+class HubWays {
+ public:
+  /// Those of `hubs` to which a way came or went since the last call; a new one is none of them.
+  [[nodiscard]] std::vector<NetworkHub> take(const std::vector<NetworkHub>& hubs);
+  /// As ToolSession::standing_of(), by the last call of take().
+  [[nodiscard]] std::string_view standing_of(const NodeRecord& node) const;
+
+ private:
+  std::map<std::uint32_t, bool> reachable_;
+};
+
 /// Is it part of what was there before, not a change?
 [[nodiscard]] bool is_snapshot(Change change);
 
 /// An object and a newline. `now_ns`: wall_now_ns() when it came.
-[[nodiscard]] std::string json_line(const WatchEvent& event, std::int64_t now_ns);
+[[nodiscard]] std::string json_line(const WatchEvent& event, std::int64_t now_ns,
+                                    const HubWays& ways = {});
 /// A line for people, in local time; "" for what they need not see.
 [[nodiscard]] std::string text_line(const WatchEvent& event, std::int64_t now_ns,
+                                    Paint paint = Paint{}, const HubWays& ways = {});
+/// The same of a hub to which a way came or went.
+[[nodiscard]] std::string json_line(const NetworkHub& hub, std::int64_t now_ns);
+[[nodiscard]] std::string text_line(const NetworkHub& hub, std::int64_t now_ns,
                                     Paint paint = Paint{});
 
 }  // namespace gimnet::tool

@@ -35,17 +35,17 @@ TEST(WatchReport, ALineForPeople) {
   WatchEvent joined = node_event(Change::joined, 17, "robot", "a\x1b[2J");
   joined.node->place = "127.0.0.1:5";
   EXPECT_EQ(text_line(joined, kNoon),
-            "12:34:56.789  joined      node robot 7.17, from 127.0.0.1:5, a.[2J\n");
+            "12:34:56.789  joined       node robot 7.17, from 127.0.0.1:5, a.[2J\n");
   WatchEvent renamed = node_event(Change::renamed, 17, "two", "");
   renamed.former_name = "one";
-  EXPECT_EQ(text_line(renamed, kNoon), "12:34:56.789  renamed     node two 7.17, before one\n");
+  EXPECT_EQ(text_line(renamed, kNoon), "12:34:56.789  renamed      node two 7.17, before one\n");
   WatchEvent service;
   service.change = Change::withdrawn;
   service.service.emplace();
   service.service->name = "robot/odom";
   service.service->node = Peer{(7u << 20) | 17};
   EXPECT_EQ(text_line(service, kNoon, Paint(true)),
-            "\x1b[31m12:34:56.789  withdrawn   service robot/odom of 7.17\x1b[0m\n");
+            "\x1b[31m12:34:56.789  withdrawn    service robot/odom of 7.17\x1b[0m\n");
   EXPECT_EQ(text_line(WatchEvent{}, kNoon), "") << "of the watch itself";
 }
 
@@ -57,7 +57,7 @@ TEST(WatchReport, AnObjectForPrograms) {
   EXPECT_EQ(
       json_line(node_event(Change::joined, 17, "robot", ""), 5),
       R"({"time_ns":5,"change":"joined","hub_id":7,"epoch":3,"version":9,"node":{"id":"7.17","name":"robot",)"
-      R"("hub":"lab","hub_id":7,"connected":false,"description":"","place":"","joined_ms":0,"services":0}})"
+      R"("hub":"lab","hub_id":7,"connected":false,"state":"away","description":"","place":"","joined_ms":0,"services":0}})"
       "\n");
   EXPECT_EQ(json_line(WatchEvent{}, 5),
             R"({"time_ns":5,"change":"snapshot_begins","hub_id":0,"epoch":0,"version":0})"
@@ -75,6 +75,25 @@ TEST(WatchReport, OfAWithdrawnServiceOnlyWhoItWas) {
             R"({"time_ns":5,"change":"withdrawn","hub_id":0,"epoch":0,"version":0,)"
             R"("service":{"name":"robot/odom","node":"7.17","group":12}})"
             "\n");
+}
+
+TEST(WatchReport, OfWaysToHubs) {
+  HubWays ways;
+  const NodeRecord robot = *node_event(Change::present, 17, "robot", "").node;
+  NetworkHub lab;
+  lab.hub_id = 7;
+  lab.name = "lab";
+  EXPECT_TRUE(ways.take({lab}).empty()) << "it was not known before";
+  EXPECT_EQ(ways.standing_of(robot), kUnreachable);
+  EXPECT_EQ(text_line(node_event(Change::present, 17, "robot", ""), kNoon, Paint{}, ways),
+            "12:34:56.789  present      node robot 7.17, unreachable\n");
+  EXPECT_EQ(text_line(lab, kNoon), "12:34:56.789  unreachable  hub 7 lab\n");
+  lab.reachable = true;
+  EXPECT_EQ(ways.take({lab}).size(), 1u);
+  EXPECT_TRUE(ways.take({lab}).empty());
+  EXPECT_EQ(ways.standing_of(robot), "away");
+  EXPECT_EQ(json_line(lab, 5), R"({"time_ns":5,"change":"reachable","hub_id":7,"hub":"lab"})"
+                               "\n");
 }
 
 TEST(WatchReport, KnowsWhatWasThereBefore) {
