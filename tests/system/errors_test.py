@@ -105,7 +105,7 @@ WITH_A_HUB = [
     (NOT_FOUND, ["there is no node '9999.1'", LIST], ["send", "9999.1"], b"x\n"),
     (NOT_FOUND, ["not acknowledged by 7.999", "no_such_node: no node has that id"], ["send", "7.999"], b"x\n"),
     (NOT_FOUND, ["not acknowledged by 8.1", "no_route: no hub of that id can be reached"], ["send", "8.1"], b"x\n"),
-    (NOT_FOUND, ["cannot ping 7.999", "no_such_node: no node has that id"], ["ping", "7.999", "-c", "1"], b""),
+    (NOT_FOUND, ["7.999 cannot be reached: ", "no_such_node: no node has that id"], ["ping", "7.999", "-c", "1"], b""),
     (USAGE, ["7.1048575 cannot be pinged: this id means all nodes"], ["ping", "7.1048575"], b""),
     (NOT_FOUND, ["no node matches 'robto'; did you mean robot?"], ["nodes", "robto"], b""),
     (NOT_FOUND, ["no service matches 'robot2/odm'; did you mean robot2/odom?"], ["services", "robot2/odm"], b""),

@@ -50,7 +50,7 @@ void PingTable::on_lost(std::uint32_t number, const std::string& why) {
   const auto place = waiting_.find(number);
   if (place == waiting_.end()) return;
   place->second.answer =
-      Failure{Status::not_delivered, "cannot ping " + place->second.peer.text() + ": " + why};
+      Failure{Status::not_delivered, place->second.peer.text() + " cannot be reached: " + why};
   answered_.notify_all();
 }
 

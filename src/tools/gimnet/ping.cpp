@@ -74,7 +74,9 @@ std::optional<Failure> ping_once(ToolSession& session, Peer peer, PingCounts& co
     --counts.sent;
   } else {
     ++counts.lost;
-    if (!answer.is(Status::timeout)) return answer.failure();
+    // A node that has answered may be out of reach for a while.
+    const bool goes_on = answer.is(Status::not_delivered) && counts.round_trips.count() > 0;
+    if (!answer.is(Status::timeout) && !goes_on) return answer.failure();
   }
   if (options.json || session.stopped()) return std::nullopt;
   session.output().write(answer ? "answer from " + peer.text() + " in " +
