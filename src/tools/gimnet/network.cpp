@@ -110,7 +110,10 @@ std::string text_of(const std::vector<LinkRecord>& links, Paint paint) {
                "LAST ERROR"});
   for (const LinkRecord& link : links) {
     const bool right = link.state == "up" || link.state == "standby";
-    table.add({link.name, text_if(link.hub_id != 0, link.hub_id), link.state,
+    // The other hub chose the name of a link that it dialled, mostly this hub's address.
+    const bool from = !link.dialled && link.hub_id != 0;
+    table.add({from ? "from hub " + std::to_string(link.hub_id) : link.name,
+               text_if(link.hub_id != 0, link.hub_id), link.state,
                text_if(link.cost != 0, link.cost), text_if(link.rtt_us != 0, link.rtt_us),
                std::to_string(link.queued_bytes), std::to_string(link.sent_bytes),
                std::to_string(link.received_bytes), link.peer, link.last_error},

@@ -114,6 +114,10 @@ TEST(NetworkText, OfLinks) {
                         "\"cost\":null,\"rtt_us\":null,\"clock_offset_us\":null"));
   EXPECT_THAT(json_of(std::vector{dialling}), HasSubstr("\"last_error\":\"nobody listens\""));
   EXPECT_THAT(text_of(std::vector{dialling}), HasSubstr("nobody listens"));
+  LinkRecord link = some_link();
+  EXPECT_THAT(text_of(std::vector{link}), HasSubstr("\nhall "));
+  link.dialled = false;
+  EXPECT_THAT(text_of(std::vector{link}), HasSubstr("\nfrom hub 2 ")) << "its name is the other's";
 }
 
 TEST(NetworkText, OfAWay) {
