@@ -27,7 +27,7 @@ class Sending(unittest.TestCase):
     def test_a_service_that_gives_data_takes_none(self):
         send = run_gimnet(self.hub, "send", "bot/odom", data=b"one\n")
         self.assertEqual(send.code, NOT_FOUND, send.err)
-        self.assertIn("cannot send to 'bot/odom': it gives data and takes none; subscribe to it", send.err)
+        self.assertIn("cannot send to 'bot/odom': it gives data and takes none; use `gimnet echo bot/odom`", send.err)
 
     def test_a_service_that_a_node_does_not_have(self):
         send = run_gimnet(self.hub, "send", "bot/driv", data=b"one\n")
@@ -56,7 +56,7 @@ class Accepting(unittest.TestCase):
                 ended = run_gimnet(self.hub, command, "robot/drive")
                 self.assertEqual(ended.code, NOT_FOUND, ended.err)
                 self.assertIn("robot/drive", ended.err)
-                self.assertIn("it takes data and gives none; send to it", ended.err)
+                self.assertIn("it takes data and gives none; use `gimnet send robot/drive`", ended.err)
 
     def test_who_waits_for_one_is_told_when_it_comes(self):
         readers = [start_gimnet(self, self.hub, command, "robot/drive") for command in READERS]
@@ -65,7 +65,7 @@ class Accepting(unittest.TestCase):
         self.advertise(accepts=True)
         for reader in readers:
             self.assertEqual(reader.wait(), NOT_FOUND, reader.err)
-            self.assertIn("robot/drive takes data and gives none; send to it", reader.err)
+            self.assertIn("robot/drive takes data and gives none; use `gimnet send robot/drive`", reader.err)
 
     def test_it_may_become_one_that_provides(self):
         self.advertise(accepts=True)

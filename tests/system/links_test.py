@@ -306,6 +306,8 @@ class Between(unittest.TestCase):
         wait_until(lambda: pings.out.count(b" cannot be reached: the hub reports no_route") > 1, "pings that go on")
         present = run_gimnet(second, "watch", "B", "-n", "1")
         self.assertRegex(present.out.decode(), "  present      node B 1[.][0-9]+, unreachable")
+        echo = run_gimnet(second, "echo", "B/add", "--seconds", "0.1")
+        self.assertIn("there is no way to the hub of B/add; waiting for one", echo.err)
         ping = run_gimnet(second, "ping", "B", "-c", "1")
         self.assertEqual(ping.code, 4)
         self.assertIn("the node 'B' is unreachable: there is no way to its hub hub-1; `gimnet hubs` shows when", ping.err)

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "base/clock.hpp"
+#include "base/ids.hpp"
 #include "tools/gimnet/options.hpp"
 #include "tools/gimnet/session.hpp"
 
@@ -71,7 +72,21 @@ bool Subscriptions::take_lateness(std::string_view service) {
 std::string Subscriptions::waits_for() const {
   if (follower_)
     return follower_->any() ? "" : "no service matches " + word_ + " yet; waiting for one";
+  if (is_unreachable())
+    return "there is no way to the hub of " + word_ + "; waiting for one; `gimnet hubs` shows it";
   return !one_ || one_->exists() ? "" : "nobody provides " + word_ + " yet; waiting for it";
+}
+
+/// The hub lists services of another one as long as it keeps their nodes' names.
+bool Subscriptions::is_unreachable() const {
+  const auto services = node_.services(word_);
+  if (!services || services->empty()) return false;
+  const std::uint32_t hub_id = hub_of(NodeId{services->front().node.id}).value();
+  if (hub_id == hub_of(NodeId{node_.peer().id}).value()) return false;
+  const auto hubs = node_.hubs();
+  if (!hubs) return false;
+  const auto hub = std::ranges::find(*hubs, hub_id, &NetworkHub::hub_id);
+  return hub != hubs->end() && !hub->reachable;
 }
 
 }  // namespace gimnet::tool

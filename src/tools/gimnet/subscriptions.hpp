@@ -37,11 +37,13 @@ class Subscriptions {
   [[nodiscard]] std::map<std::string, std::uint64_t> missed() const;
   /// As MatchingServices::take_lateness(); never of one that was called by its full name.
   [[nodiscard]] bool take_lateness(std::string_view service);
-  /// The words for the user while there is nothing to subscribe to; "" when there is.
+  /// The words for the user while there is nothing to subscribe to, or no way to the hub of the
+  /// service; "" when there is.
   [[nodiscard]] std::string waits_for() const;
 
  private:
   [[nodiscard]] Outcome<void> ask_terms();
+  [[nodiscard]] bool is_unreachable() const;
 
   Node& node_;
   std::string word_;
