@@ -223,7 +223,7 @@ class Between(unittest.TestCase):
         self.assertEqual((receiver.wait(), receiver.out), (0, b"one\ntwo\n"), receiver.err)
 
     def test_a_link_that_may_not_speak_for_a_hub(self):
-        """Its frames are dropped, counted and logged, and it stays."""
+        """Its frames are dropped, counted, logged and reported, and it stays."""
         file = os.path.join(self.enterContext(tempfile.TemporaryDirectory(prefix="gimnet-test-")), "hub.toml")
         with open(file, "w", encoding="utf-8") as text:
             text.write("[links]\naccept_links = true\nallow = [3]\n")
@@ -235,8 +235,11 @@ class Between(unittest.TestCase):
         start_recv(self, first, "B")
         there = first.wait_for_node("B")["id"]
         self.assertEqual(run_gimnet(third, "ping", there, "-c", "1").code, 0)
-        self.assertEqual(run_gimnet(second, "ping", there, "-c", "1", "-W", "0.2").code, 5)
-        self.assertEqual(first.counter("dropped.wrong_source"), 1)
+        denied = run_gimnet(second, "send", there, data=b"hello\n")
+        self.assertEqual(denied.code, 6, denied.err)
+        self.assertIn("not_allowed: a link between hubs may not carry it", denied.err)
+        self.assertIn("the hub reports not_allowed", run_gimnet(second, "ping", there, "-c", "1").err)
+        self.assertEqual(first.counter("dropped.not_allowed"), 2)
         wait_until(lambda: "link to hub 2: dropped a frame of kind 0 whose source is at hub 2: that link may not speak for hub 2"
                    in first.process.err, "the line of its log")
         self.assertEqual(self.states(first), {first.url: "up"})

@@ -14,6 +14,14 @@ bool is_counted(proto::Kind kind) {
   return kind != proto::Kind::report && kind != proto::Kind::flow;
 }
 
+/// Why the frame is refused: its source is at a hub that `allow` does not name, or is none of
+/// another hub.
+proto::DropReason refusal_of(const proto::RunView& view, const LinkRule& rule) {
+  const HubId source = hub_of(NodeId{proto::load_header(view.bytes).src});
+  const bool elsewhere = source != rule.own && source != kOwnHub && source.value() <= kHubIdMax;
+  return elsewhere ? proto::DropReason::not_allowed : proto::DropReason::wrong_source;
+}
+
 }  // namespace
 
 bool LinkReader::take(Connection& connection, const proto::RunView& view, Admission admission) {
@@ -34,7 +42,7 @@ bool LinkReader::take(Connection& connection, const proto::RunView& view, Admiss
     case Admission::wrong_source:
       state_.counters.wrong_source.add(view.frames);
       tell_refused(connection, view);
-      drop(connection, view, proto::DropReason::wrong_source);
+      drop(connection, view, refusal_of(view, connection.link->rule));
       return true;
     case Admission::hop_limit:
       drop(connection, view, proto::DropReason::hop_limit);
@@ -74,8 +82,8 @@ void LinkReader::drop(Connection& connection, const proto::RunView& view,
                       proto::DropReason reason) {
   if (!is_counted(proto::load_header(view.bytes).kind)) return;
   count_accepted(state_, connection, view);
-  // A sender that may not speak there is not told: the source may be anybody's.
-  if (reason == proto::DropReason::hop_limit) {
+  // The source of other frames is not told of them: it may be anybody's.
+  if (reason == proto::DropReason::hop_limit || reason == proto::DropReason::not_allowed) {
     state_.drops.drop(view.bytes, view.frames, reason);
   } else {
     state_.tally.drop(reason, view.frames);

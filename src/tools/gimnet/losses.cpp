@@ -7,6 +7,8 @@
 namespace gimnet::tool {
 
 std::string loss_words(const SendCounts& counts, const std::string& target) {
+  if (counts.loss_reason == LossReason::not_allowed)
+    return counts.loss + ": a link between hubs may not carry it, or the service takes no data";
   if (counts.loss_reason != LossReason::no_such_node || Peer::parse(target)) return counts.loss;
   return "the hub reports no_such_node: " + target + " has left";
 }

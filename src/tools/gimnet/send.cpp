@@ -184,6 +184,8 @@ ExitCode run_send(ToolSession& session) {
         (unsent == Unsent::nothing ? "" : ", and the rest of the input was not sent"));
     return code;
   }
+  if (counts.acknowledged == 0 && counts.loss_reason == LossReason::not_allowed)
+    return ExitCode::denied;
   return nobody_there(counts) ? ExitCode::not_found : ExitCode::failed;
 }
 
