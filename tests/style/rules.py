@@ -238,7 +238,7 @@ def queues_name_their_limit(tree):
 # Who may ask for the time, and for randomness that no seed gives: everybody else is handed them, and can be simulated.
 CLOCKS = ("src/base/clock.hpp",)
 RANDOMNESS = ("src/base/random.hpp", "src/base/random.cpp", "src/hub/config/state_folder.cpp", "src/hub/shard/attacher.cpp",
-              "src/client/nif/node.cpp", "src/client/nif/node_thread.cpp", "src/client/gimi/uplink.cpp")
+              "src/client/nif/node_thread.hpp", "src/client/nif/node_thread.cpp", "src/client/gimi/uplink.cpp")
 
 
 def time_and_chance_are_handed_in(tree):

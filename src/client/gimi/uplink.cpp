@@ -115,15 +115,15 @@ void Uplink::credit(const TakenMessages& taken, bool more) const {
 }
 
 void Uplink::deliver() const {
-  if (nif::Node* const direct = direct_.load()) direct->deliver_again();
+  if (nif::Node* const direct = direct_.load()) direct->thread().deliver_again();
 }
 
 void Uplink::set_task(std::function<net::Deadline()> task) const {
-  if (nif::Node* const direct = direct_.load()) direct->set_task(std::move(task));
+  if (nif::Node* const direct = direct_.load()) direct->thread().set_task(std::move(task));
 }
 
 void Uplink::rouse() const {
-  if (nif::Node* const direct = direct_.load()) direct->rouse();
+  if (nif::Node* const direct = direct_.load()) direct->thread().rouse();
 }
 
 bool Uplink::tell_missed(std::uint32_t group, std::uint64_t total) const {

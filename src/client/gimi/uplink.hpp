@@ -79,7 +79,7 @@ class Uplink {
   /// As nif_credit() and nif_deliver().
   void credit(const TakenMessages& taken, bool more) const;
   void deliver() const;
-  /// As Node::set_task() and Node::rouse().
+  /// As NodeThread::set_task() and NodeThread::rouse().
   void set_task(std::function<net::Deadline()> task) const;
   void rouse() const;
   /// As CreditBook::tell_missed().

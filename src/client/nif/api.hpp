@@ -44,7 +44,7 @@ nif_status with_node(const nif_node* handle, Body body) noexcept {
 template <class Body>
 nif_status with_waiting_node(const nif_node* handle, Body body) noexcept {
   return with_node(handle, [&](Node& node) -> nif_status {
-    if (node.in_callback())
+    if (node.thread().is_current())
       return fail(NIF_IN_CALLBACK, "a call that waits for the hub was made in the callback");
     return body(node);
   });

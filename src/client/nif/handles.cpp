@@ -128,7 +128,7 @@ nif_status close_node(nif_node* handle) {
   {
     const NodeRef ref = find_node(handle);
     if (!ref && ref.status() != NIF_FORKED) return ref.status();
-    if (ref && ref->in_callback())
+    if (ref && ref->thread().is_current())
       return fail(NIF_IN_CALLBACK, "nif_close() was called from the handle's own callback");
   }
   std::uintptr_t generation = 0;
@@ -140,7 +140,7 @@ nif_status close_node(nif_node* handle) {
   } while (!slot.state.compare_exchange_weak(state, state & ~kOpen));
   Node* const node = slot.node;
   if (slot.fork_generation != fork_generation()) {
-    node->abandon();
+    node->thread().abandon();
     return NIF_OK;
   }
   node->begin_close();

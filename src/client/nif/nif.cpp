@@ -62,7 +62,7 @@ size_t nif_last_error(nif_node* node, char* buffer, size_t size) {
   size_t length = 0;
   if (buffer != nullptr && size > 0) *buffer = '\0';
   const nif_status status = with_node(node, [&](Node& found) -> nif_status {
-    const std::string sentence = found.last_error();
+    const std::string sentence = found.record().last_error();
     length = sentence.size();
     if (buffer == nullptr || size == 0) return NIF_OK;
     const std::string_view kept = gimnet::nif::cut_text(sentence, size - 1);
@@ -134,7 +134,7 @@ int nif_event_fd(nif_node* node) {
 
 nif_status nif_deliver(nif_node* node) {
   return with_node(node, [](Node& found) -> nif_status {
-    found.deliver_again();
+    found.thread().deliver_again();
     return NIF_OK;
   });
 }

@@ -65,10 +65,10 @@ template <class Once>
 nif_status declare(Node& node, Once once) {
   bool done = false;
   for (;;) {
-    const std::uint32_t before = node.reconnects();
+    const std::uint32_t before = node.record().info().reconnects;
     const nif_status status = once();
     if (status == NIF_NOT_FOUND && done) return NIF_OK;  // ended twice
-    if (status != NIF_OK || before == node.reconnects()) return status;
+    if (status != NIF_OK || before == node.record().info().reconnects) return status;
     done = true;
   }
 }

@@ -88,13 +88,13 @@ TEST(NodeThread, ConfirmsWithEveryKeepAliveAndEachQuarter) {
 class CountingTask {
  public:
   explicit CountingTask(nif_node* node) : node_(share_node(node)) {
-    node_->set_task([this] {
+    node_->thread().set_task([this] {
       runs_.fetch_add(1);
       return steady_now_ns() + kNsPerMs;
     });
   }
   ~CountingTask() {
-    node_->set_task({});
+    node_->thread().set_task({});
     node_->drop();
   }
   CountingTask(const CountingTask&) = delete;

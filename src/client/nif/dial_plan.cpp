@@ -1,0 +1,58 @@
+#include "client/nif/dial_plan.hpp"
+
+#include <algorithm>
+
+namespace gimnet::nif {
+
+void DialPlan::admitted(const std::string& url) {
+  hub_ends_ = false;
+  const auto there = std::ranges::find(addresses_, url, &net::Address::url);
+  if (there != addresses_.end()) std::rotate(addresses_.begin(), there, addresses_.end());
+}
+
+bool DialPlan::may_resume(proto::GoodbyeCode code, const SessionTerms& session) const {
+  const bool kept = code == proto::GoodbyeCode::done || code == proto::GoodbyeCode::silent ||
+                    code == proto::GoodbyeCode::slow_consumer ||
+                    code == proto::GoodbyeCode::stalled_frame;
+  return dials_to_resume_ && session.resume && session.grace_ns > 0 && kept;
+}
+
+std::optional<Failure> DialPlan::broke(const std::string& why, proto::GoodbyeCode code,
+                                       const SessionTerms& session, std::int64_t now_ns) {
+  resumes_only_ = may_resume(code, session);
+  hub_ends_ = code == proto::GoodbyeCode::draining;
+  broke_ns_ = now_ns;
+  grace_ns_ = session.grace_ns;
+  switch (code) {
+    case proto::GoodbyeCode::replaced:
+      return Failure{NIF_REPLACED, why + "; end the other program, or connect under another name"};
+    case proto::GoodbyeCode::kicked:
+      return Failure{NIF_REFUSED, why};
+    case proto::GoodbyeCode::renumbered:
+      return std::nullopt;  // not told to go: it comes back whatever else it does at a break
+    default:
+      if (reconnect_ || resumes_only_) return std::nullopt;
+      return Failure{NIF_NOT_CONNECTED, why};
+  }
+}
+
+std::span<const net::Address> DialPlan::addresses(std::int64_t now_ns) const {
+  const bool may_be_back = !hub_ends_ && now_ns - broke_ns_ < kFormerHubNs;
+  const std::size_t most = resumes_only_ || may_be_back ? 1 : addresses_.size();
+  return std::span(addresses_).first(std::min(most, addresses_.size()));
+}
+
+Deadline DialPlan::deadline(std::int64_t now_ns) const {
+  const Deadline whole = now_ns + kTryNs;
+  return resumes_only_ ? std::min(whole, broke_ns_ + grace_ns_) : whole;
+}
+
+bool DialPlan::dials_again(const Failure& failure, std::int64_t now_ns) const {
+  if (failure.status == NIF_REPLACED) return false;
+  // A node that dials only because it was given another id (`renumbered`) has one try.
+  if (!resumes_only_) return reconnect_;
+  // A session that a hub keeps is gone with its process.
+  return !failure.nobody_listens && now_ns - broke_ns_ < grace_ns_;
+}
+
+}  // namespace gimnet::nif
