@@ -14,7 +14,7 @@ _Static_assert(sizeof(nif_bytes) == 16, "nif_bytes");
 _Static_assert(sizeof(nif_incoming) == 128, "nif_incoming");
 _Static_assert(sizeof(nif_subscription) == 40, "nif_subscription");
 _Static_assert(sizeof(nif_node_record) == 56, "nif_node_record");
-_Static_assert(sizeof(nif_service_record) == 56, "nif_service_record");
+_Static_assert(sizeof(nif_service_record) == 72, "nif_service_record");
 #endif
 
 static int failed(const char* step) {

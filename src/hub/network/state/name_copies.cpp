@@ -131,10 +131,12 @@ std::vector<HubId> NameCopies::set_reachable(std::span<const HubRun> hubs, milli
       begin_anew(run.hub, copy, run.instance, now);
     } else if (!copy.unreachable_until) {
       continue;
+    } else {
+      copy.stale = copy.version;
+      copy.stale_until = now + kCatchUp;
     }
     copy.unreachable_until.reset();
     begun.push_back(run.hub);
-    for (const Place& place : index_.live_of(run.hub)) compare_with_own(place->first.name);
   }
   return begun;
 }
@@ -190,6 +192,9 @@ bool NameCopies::forget(milliseconds now) {
     } else if (copy.former_until && *copy.former_until <= now) {
       drop_former(hub, copy);
     }
+    if (!copy.stale_until || *copy.stale_until > now) continue;
+    copy.stale_until.reset();
+    for (const Place& place : index_.live_of(hub)) compare_with_own(place->first.name);
   }
   for (const HubId hub : gone) drop(hub);
   return dropped != dropped_copies_;
@@ -198,11 +203,17 @@ bool NameCopies::forget(milliseconds now) {
 std::optional<milliseconds> NameCopies::next_due() const {
   std::optional<milliseconds> due;
   for (const auto& [hub, copy] : copies_) {
-    for (const auto& each : {copy.unreachable_until, copy.former_until}) {
+    for (const auto& each : {copy.unreachable_until, copy.former_until, copy.stale_until}) {
       if (each) due = std::min(due.value_or(*each), *each);
     }
   }
   return due;
+}
+
+/// It has at most half of all, whatever it sends, so that others have room.
+bool NameCopies::has_room(HubId hub, std::size_t bytes) const {
+  return counts_of(hub).bytes + bytes <= options_.bytes_max / 2 &&
+         bytes_of_others() + bytes <= options_.bytes_max;
 }
 
 NameCopies::Taken NameCopies::take(const route::Names& names) {
@@ -267,16 +278,6 @@ bool NameCopies::evict(Copy& copy, std::string_view name, const NameClaim& claim
   return true;
 }
 
-void NameCopies::forget_version(Copy& copy, const NameClaim& claim) {
-  copy.by_version.erase(claim.version);
-  copy.marks.erase(claim.version);
-}
-
-void NameCopies::erase(Copy& copy, Place place) {
-  forget_version(copy, place->second);
-  index_.erase(place);
-}
-
 void NameCopies::remove(Copy& copy, Place place) {
   const auto& [key, claim] = *place;
   if (claim.state != NameState::deleted)
@@ -300,6 +301,8 @@ bool NameCopies::is_lost_to(const KnownName& other) const {
     return false;
   const NameClaim& claim = (*mine)->second;
   if (claim.state == NameState::deleted || (claim.service && other.claim->service)) return false;
+  const Copy& copy = copies_.at(other.hub);
+  if (copy.stale_until && other.claim->version <= copy.stale) return false;
   return wins(*other.claim, claim);
 }
 
@@ -367,12 +370,6 @@ std::vector<HubId> NameCopies::take_starved() {
   return starved;
 }
 
-std::optional<HubId> NameCopies::starved() const {
-  const auto found =
-      std::ranges::find_if(copies_, [](const auto& each) { return each.second.starved; });
-  return found == copies_.end() ? std::nullopt : std::optional{found->first};
-}
-
 HubId NameCopies::largest() const {
   HubId largest{};
   for (const auto& [hub, copy] : copies_) {
@@ -395,22 +392,6 @@ std::optional<KnownName> NameCopies::find(std::string_view name) const {
       best = known;
   }
   return best;
-}
-
-std::optional<KnownName> NameCopies::find_node(NodeId node) const {
-  return known_name(index_.nodes(), index_.nodes().find(node));
-}
-
-std::optional<KnownName> NameCopies::find_group(GroupId group) const {
-  return known_name(index_.groups(), index_.groups().find(group));
-}
-
-std::optional<KnownName> NameCopies::node_after(NodeId node) const {
-  return known_name(index_.nodes(), index_.nodes().upper_bound(node));
-}
-
-std::optional<KnownName> NameCopies::group_after(GroupId group) const {
-  return known_name(index_.groups(), index_.groups().upper_bound(group));
 }
 
 }  // namespace gimnet::hub

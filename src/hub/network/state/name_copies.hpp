@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -74,6 +75,8 @@ class NameCopies {
     std::size_t bytes_max = std::size_t{64} << 20;  ///< 1 MiB at least
   };
   static constexpr std::size_t kMarksLeast = 1'024;
+  /// What changed at a hub that was away comes within that time.
+  static constexpr std::chrono::milliseconds kCatchUp = std::chrono::seconds(1);
 
   explicit NameCopies(const Options& options);
 
@@ -125,7 +128,11 @@ class NameCopies {
   /// Hubs whose names did not fit when they came, once there is room again.
   [[nodiscard]] std::vector<HubId> take_starved();
   /// Not all names of that hub fit, and there is still no room. Nothing: all names are here.
-  [[nodiscard]] std::optional<HubId> starved() const;
+  [[nodiscard]] std::optional<HubId> starved() const {
+    const auto is_starved = [](const auto& each) { return each.second.starved; };
+    const auto found = std::ranges::find_if(copies_, is_starved);
+    return found == copies_.end() ? std::nullopt : std::optional{found->first};
+  }
   /// The other hub of which this one has most bytes of names. REQUIRES: there is another hub.
   [[nodiscard]] HubId largest() const;
   /// Of the names of all other hubs.
@@ -137,11 +144,19 @@ class NameCopies {
 
   /// The best claim to a name: of hubs that can be reached before others.
   [[nodiscard]] std::optional<KnownName> find(std::string_view name) const;
-  [[nodiscard]] std::optional<KnownName> find_node(NodeId node) const;
-  [[nodiscard]] std::optional<KnownName> find_group(GroupId group) const;
+  [[nodiscard]] std::optional<KnownName> find_node(NodeId node) const {
+    return known_name(index_.nodes(), index_.nodes().find(node));
+  }
+  [[nodiscard]] std::optional<KnownName> find_group(GroupId group) const {
+    return known_name(index_.groups(), index_.groups().find(group));
+  }
   /// The first one with a higher id, for listings.
-  [[nodiscard]] std::optional<KnownName> node_after(NodeId node) const;
-  [[nodiscard]] std::optional<KnownName> group_after(GroupId group) const;
+  [[nodiscard]] std::optional<KnownName> node_after(NodeId node) const {
+    return known_name(index_.nodes(), index_.nodes().upper_bound(node));
+  }
+  [[nodiscard]] std::optional<KnownName> group_after(GroupId group) const {
+    return known_name(index_.groups(), index_.groups().upper_bound(group));
+  }
   /// Of other hubs, in the order in which they happened. Nothing is told of a copy that is dropped
   /// as a whole: `dropped_copies` counts these.
   [[nodiscard]] std::vector<NameChange> take_changes() { return std::exchange(changes_, {}); }
@@ -167,6 +182,10 @@ class NameCopies {
     std::set<std::uint64_t> marks;  ///< versions of deleted names
     std::optional<std::chrono::milliseconds> unreachable_until;
     std::optional<std::chrono::milliseconds> former_until;
+    /// Its hub was away. Until then names up to version `stale` take nothing from this hub: they
+    /// may have changed meanwhile.
+    std::optional<std::chrono::milliseconds> stale_until;
+    std::uint64_t stale = 0;
     bool starved = false;
   };
 
@@ -184,19 +203,21 @@ class NameCopies {
   void drop(HubId hub);
   void drop_former(HubId hub, Copy& copy);
   void put(HubId hub, Copy& copy, std::string_view name, const proto::route::NameClaim& claim);
-  static void forget_version(Copy& copy, const proto::route::NameClaim& claim);
-  void erase(Copy& copy, Place place);
+  static void forget_version(Copy& copy, const proto::route::NameClaim& claim) {
+    copy.by_version.erase(claim.version);
+    copy.marks.erase(claim.version);
+  }
+  void erase(Copy& copy, Place place) {
+    forget_version(copy, place->second);
+    index_.erase(place);
+  }
   /// Also tells of it.
   void remove(Copy& copy, Place place);
   void forget_marks(Copy& copy);
   /// Makes room at the id that the claim has. False: a newer name has it.
   [[nodiscard]] bool evict(Copy& copy, std::string_view name, const proto::route::NameClaim& claim);
-  /// Has that other hub room for so many bytes more? It has at most half of all, whatever it sends,
-  /// so that there is room for others.
-  [[nodiscard]] bool has_room(HubId hub, std::size_t bytes) const {
-    return counts_of(hub).bytes + bytes <= options_.bytes_max / 2 &&
-           bytes_of_others() + bytes <= options_.bytes_max;
-  }
+  /// Has that other hub room for so many bytes more?
+  [[nodiscard]] bool has_room(HubId hub, std::size_t bytes) const;
   [[nodiscard]] std::uint32_t rank_for(std::string_view name, NodeId node) const;
   [[nodiscard]] bool is_lost_to(const KnownName& other) const;
   void compare_with_own(std::string_view name);

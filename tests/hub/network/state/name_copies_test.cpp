@@ -165,11 +165,14 @@ TEST_F(NameCopiesTest, LosesNothingToAHubThatIsAwayBeforeItIsBack) {
   (void)copies_.set_reachable({}, milliseconds(0));
   copies_.put_own("a", node_claim(1, 1));
   EXPECT_EQ(copies_.find("a")->hub, kHere);
-  EXPECT_EQ(copies_.find("a")->claim->rank, kOrdinaryRank + 8);
+  EXPECT_EQ(copies_.find("a")->claim->rank, kOrdinaryRank);
   EXPECT_TRUE(copies_.take_lost().empty());
   copies_.remove_own("a");
   (void)copies_.set_reachable(runs(), milliseconds(1));
   copies_.put_own("a", node_claim(1, 1));
+  EXPECT_TRUE(copies_.take_lost().empty()) << "it may have been given back meanwhile";
+  EXPECT_EQ(copies_.next_due(), milliseconds(1) + NameCopies::kCatchUp);
+  (void)copies_.forget(milliseconds(1) + NameCopies::kCatchUp);
   EXPECT_EQ(copies_.take_lost().size(), 1u) << "one that is held is not taken over";
 }
 
@@ -181,8 +184,22 @@ TEST_F(NameCopiesTest, WhoeverStandsAtAHubThatCouldNotBeReachedKeepsTheName) {
     EXPECT_EQ(copies_.find("a")->claim->rank, kOrdinaryRank - 1) << "however often it is taken";
   }
   (void)copies_.set_reachable(runs(), milliseconds(1));
+  (void)copies_.forget(milliseconds(1) + NameCopies::kCatchUp);
   EXPECT_EQ(copies_.take_lost().size(), 1u);
   EXPECT_EQ(copies_.find("a")->hub, kThere);
+}
+
+TEST_F(NameCopiesTest, ANodeThatHasMovedMeanwhileTakesNothingByAnOldRecord) {
+  (void)copies_.take(names(0, 1, {{"a", node_claim(2, 1, 1)}}));
+  (void)copies_.set_reachable({}, milliseconds(0));
+  copies_.put_own("a", node_claim(1, 1));
+  (void)copies_.set_reachable(runs(), milliseconds(1));
+  auto away = node_claim(2, 1, 2);
+  away.state = NameState::away;
+  (void)copies_.take(names(1, 2, {{"a", away}}));
+  (void)copies_.forget(milliseconds(1) + NameCopies::kCatchUp);
+  EXPECT_TRUE(copies_.take_lost().empty());
+  EXPECT_EQ(copies_.find("a")->hub, kHere);
 }
 
 TEST_F(NameCopiesTest, ANodeThatIsAwayGivesWayToOneThatIsThereWhateverItsRank) {
