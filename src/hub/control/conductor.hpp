@@ -143,7 +143,7 @@ class Conductor final : private Administration {
   /// Carries out what follows from names and groups of other hubs.
   void settle(std::chrono::milliseconds now) {
     Effects effects;
-    names_.settle(now, effects);
+    names_.settle(now, effects, links_ == nullptr ? nullptr : &links_->next_hops());
     carry_out(effects, now);
     groups_.release(now);
   }

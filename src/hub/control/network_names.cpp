@@ -5,6 +5,7 @@
 
 #include "base/id_text.hpp"
 #include "base/log.hpp"
+#include "hub/control/next_hops.hpp"
 
 namespace gimnet::hub {
 namespace {
@@ -19,6 +20,15 @@ std::string hub_text(const NameCopies& copies, HubId hub) {
   const std::string_view name = copies.hub_name(hub);
   return "hub " + std::to_string(hub.value()) +
          (name.empty() ? "" : " (" + escaped(name, kQuotedMax) + ")");
+}
+
+/// Why that claim of another hub is better than this hub's own.
+std::string reason(const route::NameClaim& own, const route::NameClaim& winner) {
+  if (own.service) return "names of nodes go before those of services";
+  if (own.state != winner.state) return "the node here has lost its connection";
+  if (own.rank == winner.rank) return "its id is the lower one, and both claims have one rank";
+  return "its claim has rank " + std::to_string(winner.rank) + ", and the one of this hub " +
+         std::to_string(own.rank);
 }
 
 }  // namespace
@@ -108,11 +118,11 @@ std::optional<milliseconds> NetworkNames::next_due() const {
   return exchange_ ? exchange_->next_due() : std::nullopt;
 }
 
-void NetworkNames::settle(milliseconds now, Effects& effects) {
+void NetworkNames::settle(milliseconds now, Effects& effects, const NextHops* hops) {
   if (!exchange_) return;
   log_shortage(now);
   // The look-ups are valid until a name changes: the effects say so only later.
-  for (const KnownName& winner : exchange_->take_lost()) let_go(winner, now, effects);
+  for (const KnownName& winner : exchange_->take_lost()) let_go(winner, {now, hops}, effects);
   for (const std::string& name : std::exchange(withdrawn_, {})) {
     if (const auto away = away_service(name))
       parts_.membership.topics().note_moved(name, away, now, effects);
@@ -171,14 +181,18 @@ std::optional<AwayService> NetworkNames::away_service(std::string_view full_name
                      service.retain};
 }
 
-void NetworkNames::let_go(const KnownName& winner, milliseconds now, Effects& effects) {
+void NetworkNames::let_go(const KnownName& winner, const Told& told, Effects& effects) {
   const std::string name{winner.name};
-  const std::string sentence = "node " + to_string(winner.claim->node) + " of hub " +
-                               std::to_string(winner.hub.value()) +
-                               " has the name and the better claim to it, from a time when the "
-                               "hubs were not connected; choose another name";
-  log_warning("this hub lets go of the name '" + name + "': " + sentence);
-  parts_.membership.lose_name(name, winner.claim->node, sentence, now, effects);
+  const std::string sentence = "node " + to_string(winner.claim->node) + " of " +
+                               hub_text(exchange_->copies(), winner.hub) + " has the name, since " +
+                               reason(*exchange_->copies().own_claim(name), *winner.claim) +
+                               "; choose another name";
+  std::string way;
+  if (told.hops != nullptr)
+    way = "; that hub is reached over the link to hub " +
+          std::to_string(told.hops->find(winner.hub).neighbour.value());
+  log_warning("this hub lets go of the name '" + name + "': " + sentence + way);
+  parts_.membership.lose_name(name, winner.claim->node, sentence, told.now, effects);
 }
 
 }  // namespace gimnet::hub

@@ -16,6 +16,8 @@
 
 namespace gimnet::hub {
 
+class NextHops;
+
 /// The names of the whole network at this hub: tells the other hubs what this one has, and its own
 /// nodes what the others have. A hub that never had a link keeps no names twice: all begins with
 /// the first connection. Thread safety: the conductor's thread only. Lifetime: its parts outlive
@@ -46,8 +48,9 @@ class NetworkNames {
   /// This hub's own names change. REQUIRES: the effects before it were noted.
   void note(const NodeNoted& noted);
   void note(const ServiceNoted& noted);
-  /// Lets go of names that were lost, and tells own nodes what changed elsewhere.
-  void settle(std::chrono::milliseconds now, Effects& effects);
+  /// Lets go of names that were lost, and tells own nodes what changed elsewhere. `hops`: for the
+  /// log; or null.
+  void settle(std::chrono::milliseconds now, Effects& effects, const NextHops* hops = nullptr);
 
   void note_let_go(std::string_view name, HubId hub) {
     if (exchange_) exchange_->note_let_go(name, hub);
@@ -72,7 +75,11 @@ class NetworkNames {
   /// At most once a minute.
   void log_shortage(std::chrono::milliseconds now);
   void note_service(const NameChange& change, std::chrono::milliseconds now, Effects& effects);
-  void let_go(const KnownName& winner, std::chrono::milliseconds now, Effects& effects);
+  struct Told {
+    std::chrono::milliseconds now{};
+    const NextHops* hops = nullptr;
+  };
+  void let_go(const KnownName& winner, const Told& told, Effects& effects);
 
   const Parts parts_;
   std::optional<NameExchange> exchange_;

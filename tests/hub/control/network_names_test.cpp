@@ -304,7 +304,13 @@ TEST_F(NetworkNamesTest, ASubscriberOfAnotherHubsServiceIsPacedAsItsTermsSay) {
 TEST_F(NetworkNamesTest, OfTwoHoldersOneLosesItsName) {
   here_.join("robot");
   Session& loser = there_.join("robot");
+  set_log_level(LogLevel::warning);
+  testing::internal::CaptureStderr();
   connect();
+  const std::string logged = testing::internal::GetCapturedStderr();
+  EXPECT_NE(logged.find("node 5.1 of hub 5 (far) has the name, since its id is the lower one"),
+            std::string::npos)
+      << logged;
   EXPECT_TRUE(here_.lost_names.empty());
   EXPECT_EQ(there_.lost_names, std::vector<std::string>{"robot"});
   EXPECT_EQ(loser.name, "");

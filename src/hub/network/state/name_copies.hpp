@@ -89,6 +89,11 @@ class NameCopies {
   void put_own(std::string_view name, const proto::route::NameClaim& claim);
   /// Nothing happens for a name that is none of this hub.
   void remove_own(std::string_view name);
+  /// Null: this hub has not that name.
+  [[nodiscard]] const proto::route::NameClaim* own_claim(std::string_view name) const {
+    const auto known = index_.find(name, options_.self.hub);
+    return known ? &(*known)->second : nullptr;
+  }
   /// Takes another hub id. All own names are to be put again.
   void renumber(HubId hub);
   /// Own names that a hub that can be reached has a better claim to, since the last call. The
