@@ -102,6 +102,13 @@ void HubLink::note_detached(const DetachedEvent& event) {
            "link " + name_ + " to " + title() + ": " + last_error);
 }
 
+void HubLink::warn_of_crowding() const {
+  log_line(LogLevel::warning, {"records", name_},
+           "link " + name_ + " to " + title() +
+               ": brings records of more hubs than there is room for, and those that could not be "
+               "reached for longest are thrown away; is a hub there that invents others?");
+}
+
 proto::route::KeepAlive HubLink::say_keep_alive(std::uint64_t digest, milliseconds now,
                                                 std::int64_t wall_ns) {
   keep_alive_at_ = now + milliseconds{keep_alive_ms_};

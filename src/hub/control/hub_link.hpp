@@ -67,6 +67,8 @@ class HubLink {
   void end_connection(bool at_once, std::chrono::milliseconds now);
   /// Keeps what `event` tells of the connection that ended, and says in the log why it did.
   void note_detached(const DetachedEvent& event);
+  /// The log says that more records come over it than there is room for. REQUIRES: peer().
+  void warn_of_crowding() const;
   [[nodiscard]] bool connected() const { return connected_; }
   /// Until then a broken link may be resumed, and frames wait. Nothing: it is not broken.
   [[nodiscard]] std::optional<std::chrono::milliseconds> resume_until() const {

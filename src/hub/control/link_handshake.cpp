@@ -58,6 +58,16 @@ std::optional<Goodbye> LinkHandshake::refusal_of(const proto::HubIntroduction& s
   return std::nullopt;
 }
 
+std::string LinkHandshake::taken_sentence(const HubLink* over) const {
+  const proto::HubKey& holder = parts_.network.map().own_id_holder()->hub;
+  const StoredRecord* record = parts_.network.store().find(holder);
+  const std::string name = record == nullptr ? std::string{} : record->head()->name;
+  return "hub id " + std::to_string(holder.hub.value()) + " is kept by another hub" +
+         (name.empty() ? "" : " '" + name + "'") +
+         (over == nullptr ? "" : ", as " + over->title() + " says over link " + over->name()) +
+         "; give one of them another one with --hub-id";
+}
+
 proto::HubIntroduction LinkHandshake::introduce(const LinkTerms& terms) const {
   const HubIdentity& self = parts_.network.self();
   proto::HubIntroduction said;

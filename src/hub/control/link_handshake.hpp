@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <optional>
+#include <string>
 
 #include "hub/control/acceptor.hpp"
 #include "hub/control/hub_facts.hpp"
@@ -37,6 +38,9 @@ class LinkHandshake {
   /// about.
   [[nodiscard]] std::optional<proto::Goodbye> refusal_of(const proto::HubIntroduction& said,
                                                          const LinkAdmissionAnswer& answer) const;
+  /// The hub that keeps this hub's id, and the link `over` which that was heard (null: it is gone).
+  /// REQUIRES: Verdict::id_taken.
+  [[nodiscard]] std::string taken_sentence(const HubLink* over) const;
 
  private:
   const Parts parts_;

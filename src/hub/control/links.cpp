@@ -285,6 +285,9 @@ std::optional<milliseconds> Links::next_deadline() const {
 void Links::advance(Moment moment) {
   network_.advance(moment.now);
   send_all(network_.take_sendings());
+  if (const auto crowding = network_.take_crowding()) {
+    if (const HubLink* link = find(*crowding)) link->warn_of_crowding();
+  }
   publish_routes();
   if (map_seen_ != network_.maps()) {
     map_seen_ = network_.maps();
@@ -304,23 +307,12 @@ void Links::send_all(std::span<const Sending> sendings) {
   }
 }
 
-std::string Links::taken_sentence() {
-  const Way& way = *network_.map().own_id_holder();
-  const StoredRecord* record = network_.store().find(way.hub);
-  const std::string name = record == nullptr ? std::string{} : record->head()->name;
-  const HubLink* link = find(way.link);
-  return "hub id " + std::to_string(way.hub.hub.value()) + " is kept by another hub" +
-         (name.empty() ? "" : " '" + name + "'") +
-         (link == nullptr ? "" : ", as " + link->title() + " says over link " + link->name()) +
-         "; give one of them another one with --hub-id";
-}
-
 /// It serves its own nodes, and tries again.
 void Links::leave_network(Verdict verdict, Moment moment) {
   const bool copied = verdict == Verdict::copied;
   const std::string sentence =
       copied ? "another machine runs a copy of this state folder; delete it on one of them"
-             : taken_sentence();
+             : handshake_.taken_sentence(find(network_.map().own_id_holder()->link));
   log_line(LogLevel::error, {"left", "network"}, "left the network: " + sentence);
   if (!copied && may_give_way(moment.now)) draw_again();
   network_.leave();

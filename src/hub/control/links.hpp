@@ -109,8 +109,6 @@ class Links {
     return !wiring_.facts.redrawn || now - wiring_.facts.started >= kRedrawPause;
   }
   void leave_network(Verdict verdict, Moment moment);
-  /// The hub that keeps this hub's id, and where that came from. REQUIRES: Verdict::id_taken.
-  [[nodiscard]] std::string taken_sentence();
   void publish_routes();
   void send(const HubLink& link, proto::Kind kind, std::span<const std::byte> payload);
   [[nodiscard]] HubLink* find(LinkNumber number);

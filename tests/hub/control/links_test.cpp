@@ -245,7 +245,7 @@ TEST(Links, AnotherCostIsToldOverTheLinkThatStands) {
     return 0u;
   };
   const std::uint32_t measured = cost_at(hubs.a, kB);
-  for (const std::uint16_t cost : {300, 50}) {
+  for (const std::uint16_t cost : {std::uint16_t{300}, std::uint16_t{50}}) {
     ASSERT_EQ(hubs.b.links.set_cost("up", cost), "");
     for (int i = 0; i < 4; ++i) hubs.pass(milliseconds{100});
     EXPECT_EQ(cost_at(hubs.a, kB), cost) << "the higher of both ends counts";

@@ -185,7 +185,7 @@ void World::take_record(std::size_t wire, std::size_t hub, const Payload& bytes)
   const hub::PartRef part = hub::read_part(*bytes);
   const auto is_known = [&state, &part] {
     const hub::StoredRecord* record = state.store().find(part->said.hub);
-    const hub::StoredPart* known = record == nullptr ? nullptr : record->part(part->said.part);
+    const hub::PartRef known = record == nullptr ? nullptr : record->part(part->said.part);
     return known != nullptr && known->bytes == part->bytes;
   };
   const bool was_known = is_known();

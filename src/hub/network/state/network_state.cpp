@@ -58,7 +58,8 @@ void NetworkState::begin_connection(LinkNumber number, LinkFacts facts,
   if (!same) link = {};
   link.facts = std::move(facts);
   link.differs_since.reset();
-  links_changed_ = true;
+  link.repair_pause = kRepairPauses.first;
+  note_links();
   for (const PartRef& part : store_.all()) send(number, part);
   static const auto kMark =
       std::make_shared<const proto::Payload>(proto::encode(proto::route::RecordsEnd{}));
@@ -75,9 +76,13 @@ void NetworkState::take_record(LinkNumber number, proto::Payload bytes,
     return;
   }
   const StoredRecord* record = store_.find(part->said.hub);
-  const StoredPart* known = record == nullptr ? nullptr : record->part(part->said.part);
+  const PartRef known = record == nullptr ? nullptr : record->part(part->said.part);
   const bool is_own = part->said.hub == own_.identity().key;
-  if (!is_own && known != nullptr && !is_newer(part->said, known->said)) return;
+  if (!is_own && known != nullptr && !is_newer(part->said, known->said)) {
+    // Repairs leave out what cannot be reached here, and the other side may believe that it can.
+    if (record->unreachable_since && is_newer(known->said, part->said)) send(number, known);
+    return;
+  }
   if (link->pace.admit(part, now)) take(number, part, now);
 }
 
@@ -88,7 +93,13 @@ void NetworkState::take(LinkNumber from, const PartRef& part, std::chrono::milli
     if (own_.living_copy() > own_.identity().instance) own_.forget_copy();
     return;
   }
-  if (store_.take(part, now) != RecordStore::Taken::newer) return;
+  const std::uint64_t crowded = store_.too_many();
+  const auto taken = store_.take(part, now);
+  if (store_.too_many() != crowded && now >= crowded_pace_.next()) {
+    crowded_pace_.note_done(now);
+    crowding_ = from;
+  }
+  if (taken != RecordStore::Taken::newer) return;
   map_changed_ = true;
   flood(part, from);
 }
@@ -104,11 +115,13 @@ void NetworkState::take_digest(LinkNumber number, std::uint64_t digest,
   if (link == nullptr || !link->has_mark) return;
   if (digest == store_.digest()) {
     link->differs_since.reset();
+    link->repair_pause = kRepairPauses.first;
   } else if (!link->differs_since) {
     link->differs_since = now;
-  } else if (now - *link->differs_since >= kRepairAfter) {
+  } else if (now - *link->differs_since >= link->repair_pause) {
     link->differs_since = now;
-    for (const PartRef& part : store_.all()) send(number, part);
+    link->repair_pause = std::min(2 * link->repair_pause, kRepairPauses.most);
+    for (const PartRef& part : store_.reachable()) send(number, part);
   }
 }
 
@@ -128,12 +141,20 @@ void NetworkState::set_damped(LinkNumber number, bool damped) {
 }
 
 void NetworkState::end_link(LinkNumber number) {
-  if (links_.erase(number) != 0) links_changed_ = true;
+  if (links_.erase(number) != 0) note_links();
+}
+
+void NetworkState::note_links() {
+  links_changed_ = true;
+  std::vector<proto::HubKey> peers;
+  for (const auto& [number, link] : links_) peers.push_back(link.facts.peer.key);
+  std::ranges::sort(peers);
+  store_.set_linked(std::move(peers));
 }
 
 void NetworkState::leave() {
   links_.clear();
-  links_changed_ = true;
+  note_links();
   sendings_.clear();
   own_.forget_copy();
   map_ = NetworkMap(own_.identity());

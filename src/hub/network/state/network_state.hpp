@@ -62,8 +62,12 @@ class NetworkState {
  public:
   /// The next hops are computed at once, then at most so often.
   static constexpr std::chrono::milliseconds kMapPause{50};
-  /// Neighbours whose records differ for so long send all of them again, each time.
-  static constexpr std::chrono::milliseconds kRepairAfter = std::chrono::seconds(1);
+  /// Neighbours whose records differ for so long send them again: those of hubs that they can
+  /// reach, which are the ones that they compare. The pauses double as long as it does not help.
+  static constexpr ChangePace::Pauses kRepairPauses{std::chrono::seconds(1),
+                                                    std::chrono::minutes(1)};
+  /// Between two times that a link is named which brings more records than there is room for.
+  static constexpr std::chrono::milliseconds kCrowdedPause = std::chrono::minutes(1);
 
   /// The pause between two looks for records that are too old.
   static constexpr std::chrono::milliseconds kForgetPause = std::chrono::seconds(10);
@@ -109,6 +113,11 @@ class NetworkState {
   [[nodiscard]] const RecordStore& store() const { return store_; }
   [[nodiscard]] std::uint64_t digest() const { return store_.digest(); }
   [[nodiscard]] Verdict verdict() const;
+  /// The link that brought more records than there is room for, at most one each kCrowdedPause.
+  /// Nothing: there was none since the last call.
+  [[nodiscard]] std::optional<LinkNumber> take_crowding() {
+    return std::exchange(crowding_, std::nullopt);
+  }
   /// Messages that were not what they should be.
   [[nodiscard]] std::uint64_t malformed() const { return malformed_; }
 
@@ -118,12 +127,14 @@ class NetworkState {
     bool has_mark = false;
     bool damped = false;
     std::optional<std::chrono::milliseconds> differs_since;
+    std::chrono::milliseconds repair_pause = kRepairPauses.first;
     PartPace pace;
   };
   [[nodiscard]] Link* find(LinkNumber number);
   void take(LinkNumber from, const PartRef& part, std::chrono::milliseconds now);
   void say_own(std::chrono::milliseconds now);
   void compute_map(std::chrono::milliseconds now);
+  void note_links();
   void send(LinkNumber link, const PartRef& part);
   void flood(const PartRef& part, LinkNumber except);
   [[nodiscard]] bool carries_rather(const LinkFacts& link, const LinkFacts& than) const;
@@ -139,6 +150,8 @@ class NetworkState {
   bool map_changed_ = false;
   ChangePace map_pace_{{kMapPause, kMapPause}};
   ChangePace forget_pace_{{kForgetPause, kForgetPause}};
+  ChangePace crowded_pace_{{kCrowdedPause, kCrowdedPause}};
+  std::optional<LinkNumber> crowding_;
   std::vector<Sending> sendings_;
   std::uint64_t malformed_ = 0;
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <iterator>
 
 #include "base/endian.hpp"
 #include "hub/crypto/hmac.hpp"
@@ -24,6 +25,11 @@ std::uint64_t mark_of(const RecordPart& part) {
   store_le(text.data() + 28, part.instance.value());
   return load_le<std::uint64_t>(sha256(text).data());
 }
+
+/// A part in memory is larger than what came.
+constexpr std::size_t kPartOverhead = 256;
+
+std::size_t bytes_of(const StoredPart& part) { return part.bytes.size() + kPartOverhead; }
 
 auto place_of(const std::vector<PartRef>& parts, std::uint16_t number) {
   return std::ranges::lower_bound(parts, number, {},
@@ -52,20 +58,22 @@ bool is_newer(const RecordPart& part, const RecordPart& than) {
   return higher == (apart <= kFarApart);
 }
 
-const StoredPart* StoredRecord::part(std::uint16_t number) const {
+PartRef StoredRecord::part(std::uint16_t number) const {
   const auto found = place_of(parts_, number);
-  return found != parts_.end() && (*found)->said.part == number ? found->get() : nullptr;
+  return found != parts_.end() && (*found)->said.part == number ? *found : nullptr;
 }
 
 const RecordPart* StoredRecord::head() const {
-  const StoredPart* first = part(0);
+  const PartRef first = part(0);
   return first == nullptr ? nullptr : &first->said;
 }
 
 void StoredRecord::put(PartRef part) {
   const auto number = part->said.part;
   const auto at = parts_.begin() + (place_of(parts_, number) - parts_.cbegin());
+  bytes_ += bytes_of(*part);
   if (at != parts_.end() && (*at)->said.part == number) {
+    bytes_ -= bytes_of(**at);
     *at = std::move(part);
   } else {
     parts_.insert(at, std::move(part));
@@ -75,33 +83,83 @@ void StoredRecord::put(PartRef part) {
 RecordStore::Taken RecordStore::take(const PartRef& part, std::chrono::milliseconds now) {
   const RecordPart& said = part->said;
   auto found = records_.find(said.hub);
-  const StoredPart* before = found == records_.end() ? nullptr : found->second.part(said.part);
+  const PartRef before = found == records_.end() ? nullptr : found->second.part(said.part);
   if (before != nullptr && !is_newer(said, before->said)) return Taken::known;
-  const std::size_t freed = before == nullptr ? 0 : before->bytes.size();
-  if (bytes_ - freed + part->bytes.size() > kBytesMax) {
-    ++too_many_;
-    return Taken::too_many;
-  }
-  if (found == records_.end()) {
-    if (!has_room_for(said.hub.hub)) {
+  if (!is_linked(said.hub)) {
+    const std::size_t freed = before == nullptr ? 0 : bytes_of(*before);
+    const std::size_t added = bytes_of(*part) - std::min(freed, bytes_of(*part));
+    const bool reachable = found != records_.end() && !found->second.unreachable_since;
+    const bool fits =
+        (found != records_.end() || has_room_for(said.hub.hub)) && has_room_for(added, reachable);
+    if (!fits) {
       ++too_many_;
       return Taken::too_many;
     }
-    found = records_.try_emplace(said.hub).first;
-    found->second.unreachable_since = now;
   }
-  bytes_ += part->bytes.size() - freed;
-  found->second.put(part);
+  // It may have been the one that had to go.
+  const auto [record, is_new] = records_.try_emplace(said.hub);
+  if (is_new) record->second.unreachable_since = now;
+  put(record->second, part);
   return Taken::newer;
 }
 
-void RecordStore::put_own(const PartRef& part) { records_[part->said.hub].put(part); }
+void RecordStore::put_own(const PartRef& part) { put(records_[part->said.hub], part); }
 
-bool RecordStore::has_room_for(HubId hub) const {
+void RecordStore::put(StoredRecord& record, const PartRef& part) {
+  bytes_ -= record.bytes();
+  if (record.unreachable_since) unreachable_bytes_ -= record.bytes();
+  record.put(part);
+  bytes_ += record.bytes();
+  if (record.unreachable_since) unreachable_bytes_ += record.bytes();
+}
+
+RecordStore::Records::iterator RecordStore::drop(Records::iterator record) {
+  bytes_ -= record->second.bytes();
+  if (record->second.unreachable_since) unreachable_bytes_ -= record->second.bytes();
+  return records_.erase(record);
+}
+
+bool RecordStore::is_linked(const proto::HubKey& hub) const {
+  return std::ranges::binary_search(linked_, hub);
+}
+
+/// At the limit the record of that hub id goes that could not be reached for longest.
+bool RecordStore::has_room_for(HubId hub) {
   const auto first = records_.lower_bound(proto::HubKey{hub, {}});
-  const auto end =
-      records_.lower_bound(proto::HubKey{HubId{static_cast<std::uint16_t>(hub.value() + 1)}, {}});
-  return static_cast<std::size_t>(std::distance(first, end)) < kRecordsOfOneId;
+  std::size_t count = 0;
+  auto oldest = records_.end();
+  for (auto each = first; each != records_.end() && each->first.hub == hub; ++each, ++count) {
+    const auto& since = each->second.unreachable_since;
+    if (!since || is_linked(each->first)) continue;
+    if (oldest == records_.end() || *since < *oldest->second.unreachable_since) oldest = each;
+  }
+  if (count < kRecordsOfOneId) return true;
+  if (oldest == records_.end()) return false;
+  drop(oldest);
+  ++too_many_;
+  return true;
+}
+
+/// At the limit those that could not be reached for longest go, until half of the bound is free: to
+/// look for them costs more than to take a record.
+bool RecordStore::has_room_for(std::size_t bytes, bool reachable) {
+  const auto fits = [&] {
+    return bytes_ + bytes <= kBytesMax &&
+           (reachable || unreachable_bytes_ + bytes <= kUnreachableBytesMax);
+  };
+  if (fits()) return true;
+  std::vector<Records::iterator> lost;
+  for (auto each = records_.begin(); each != records_.end(); ++each) {
+    if (each->second.unreachable_since && !is_linked(each->first)) lost.push_back(each);
+  }
+  std::ranges::stable_sort(lost, {},
+                           [](const auto& each) { return *each->second.unreachable_since; });
+  for (const auto& each : lost) {
+    if (unreachable_bytes_ <= kUnreachableBytesMax / 2 && fits()) break;
+    drop(each);
+    ++too_many_;
+  }
+  return fits();
 }
 
 const StoredRecord* RecordStore::find(const proto::HubKey& hub) const {
@@ -117,24 +175,33 @@ std::vector<PartRef> RecordStore::all() const {
   return parts;
 }
 
+std::vector<PartRef> RecordStore::reachable() const {
+  std::vector<PartRef> parts;
+  for (const auto& [hub, record] : records_) {
+    if (!record.unreachable_since)
+      parts.insert(parts.end(), record.parts().begin(), record.parts().end());
+  }
+  return parts;
+}
+
 void RecordStore::set_reachable(std::span<const proto::HubKey> hubs,
                                 std::chrono::milliseconds now) {
   for (auto& [hub, record] : records_) {
     if (std::ranges::binary_search(hubs, hub)) {
+      if (record.unreachable_since) unreachable_bytes_ -= record.bytes();
       record.unreachable_since.reset();
     } else if (!record.unreachable_since) {
+      unreachable_bytes_ += record.bytes();
       record.unreachable_since = now;
     }
   }
 }
 
 void RecordStore::forget(std::chrono::milliseconds now) {
-  std::erase_if(records_, [now, this](const auto& entry) {
-    const auto& since = entry.second.unreachable_since;
-    if (!since || now - *since < kForgetAfter) return false;
-    for (const PartRef& part : entry.second.parts()) bytes_ -= part->bytes.size();
-    return true;
-  });
+  for (auto each = records_.begin(); each != records_.end();) {
+    const auto& since = each->second.unreachable_since;
+    each = since && now - *since >= kForgetAfter ? drop(each) : std::next(each);
+  }
 }
 
 std::uint64_t RecordStore::digest() const {

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "proto/control/route.hpp"
@@ -37,7 +38,7 @@ using PartRef = std::shared_ptr<const StoredPart>;
 class StoredRecord {
  public:
   /// Null: that part is not known.
-  [[nodiscard]] const StoredPart* part(std::uint16_t number) const;
+  [[nodiscard]] PartRef part(std::uint16_t number) const;
   [[nodiscard]] const std::vector<PartRef>& parts() const { return parts_; }
   /// Null: nothing counts, since part 0 is not known.
   [[nodiscard]] const proto::route::RecordPart* head() const;
@@ -51,24 +52,32 @@ class StoredRecord {
     }
   }
   void put(PartRef part);
+  /// Of all parts, with what it costs to keep each of them.
+  [[nodiscard]] std::size_t bytes() const { return bytes_; }
 
   /// Nothing: the hub can be reached.
   std::optional<std::chrono::milliseconds> unreachable_since;
 
  private:
   std::vector<PartRef> parts_;  ///< ascending by number; at most kPartsMax
+  std::size_t bytes_ = 0;
 };
 
 /// The records of all hubs, by hub id and unique id: whatever came over links, and this hub's own.
 /// Thread safety: none. Time is an argument. Errors: what is not taken is told, and counted where
-/// it is a fault. Limits: kRecordsOfOneId; records of hubs that could not be reached for ten
-/// minutes are thrown away by forget(), never when another record comes.
+/// it is a fault. Limits: kRecordsOfOneId, kBytesMax and kUnreachableBytesMax. Where one of them is
+/// met, the records go of the hubs that could not be reached for longest, never that of a hub at
+/// the other end of a link: whoever may link can invent hubs at will. Those of hubs
+/// that could not be reached for ten minutes are thrown away by forget().
 class RecordStore {
  public:
-  /// A hub that lost its state so many times within ten minutes is not known under a new unique id.
+  /// A hub that lost its state more often within ten minutes is not known as what it was first.
   static constexpr std::size_t kRecordsOfOneId = 64;
-  /// All parts of all other hubs, in bytes: five times what 4,000 hubs in a star say.
+  /// All parts of all hubs: five times what 4,000 hubs say that have 64 neighbours each.
   static constexpr std::size_t kBytesMax = 32 * 1024 * 1024;
+  /// Of hubs that cannot be reached: that once, since a hub that joins hears of them all before it
+  /// can reach any.
+  static constexpr std::size_t kUnreachableBytesMax = kBytesMax / 4;
   /// A hub that comes back later begins anew.
   static constexpr std::chrono::milliseconds kForgetAfter = std::chrono::minutes(10);
 
@@ -82,21 +91,32 @@ class RecordStore {
   [[nodiscard]] const StoredRecord* find(const proto::HubKey& hub) const;
   /// All parts of all records, in the order of the hubs.
   [[nodiscard]] std::vector<PartRef> all() const;
+  /// The same of the hubs that can be reached.
+  [[nodiscard]] std::vector<PartRef> reachable() const;
 
+  /// The hubs at the other ends of links, whose records are always taken. REQUIRES: ascending.
+  void set_linked(std::vector<proto::HubKey> hubs) { linked_ = std::move(hubs); }
   /// These hubs can be reached, and no others. REQUIRES: ascending.
   void set_reachable(std::span<const proto::HubKey> hubs, std::chrono::milliseconds now);
   void forget(std::chrono::milliseconds now);
 
   /// Of all parts that count of all hubs that can be reached. Equal records give equal digests.
   [[nodiscard]] std::uint64_t digest() const;
-  /// Parts that were not taken because of kRecordsOfOneId or kBytesMax.
+  /// Parts that were not taken, and records that others took the place of.
   [[nodiscard]] std::uint64_t too_many() const { return too_many_; }
 
  private:
-  [[nodiscard]] bool has_room_for(HubId hub) const;
+  using Records = std::map<proto::HubKey, StoredRecord>;
+  [[nodiscard]] bool is_linked(const proto::HubKey& hub) const;
+  [[nodiscard]] bool has_room_for(HubId hub);
+  [[nodiscard]] bool has_room_for(std::size_t bytes, bool reachable);
+  void put(StoredRecord& record, const PartRef& part);
+  Records::iterator drop(Records::iterator record);
 
-  std::map<proto::HubKey, StoredRecord> records_;  ///< Limit: kRecordsOfOneId for each hub id
-  std::size_t bytes_ = 0;                          ///< of the parts of other hubs
+  Records records_;                    ///< Limit: kRecordsOfOneId for each hub id
+  std::vector<proto::HubKey> linked_;  ///< ascending
+  std::size_t bytes_ = 0;              ///< of all records
+  std::size_t unreachable_bytes_ = 0;  ///< of those of hubs that cannot be reached
   std::uint64_t too_many_ = 0;
 };
 

@@ -167,6 +167,8 @@ TEST_F(HubWithTwoLinks, UsesTheCheaperOfTwoLinksThenTheOneOfTheLowerDiallerThenT
 }
 
 TEST_F(HubWithTwoLinks, RepairsRecordsThatDifferForASecond) {
+  hub_.take_record(kFirst, bytes(identity(9, 99), 1), later_);
+  (void)hub_.take_sendings();
   hub_.take_digest(kFirst, hub_.digest() + 1, later_);
   hub_.take_digest(kFirst, hub_.digest() + 1, later_ + milliseconds(999));
   EXPECT_EQ(sent(hub_), Sent{});
@@ -174,9 +176,54 @@ TEST_F(HubWithTwoLinks, RepairsRecordsThatDifferForASecond) {
   hub_.take_digest(kFirst, hub_.digest() + 1, later_ + milliseconds(1'000));
   EXPECT_EQ(sent(hub_), Sent{}) << "they were equal in between";
   hub_.take_digest(kFirst, hub_.digest() + 1, later_ + milliseconds(2'000));
-  EXPECT_EQ(sent(hub_), (Sent{{1, 2}, {1, 3}, {1, 5}}));
-  hub_.take_digest(kFirst, hub_.digest() + 1, later_ + milliseconds(2'999));
-  EXPECT_EQ(sent(hub_), Sent{}) << "at most once a second";
+  EXPECT_EQ(sent(hub_), (Sent{{1, 2}, {1, 3}, {1, 5}})) << "of hubs that can be reached";
+  hub_.take_digest(kFirst, hub_.digest() + 1, later_ + milliseconds(3'999));
+  EXPECT_EQ(sent(hub_), Sent{}) << "it did not help";
+  hub_.take_digest(kFirst, hub_.digest() + 1, later_ + milliseconds(4'000));
+  EXPECT_EQ(sent(hub_).size(), 3u);
+  hub_.take_digest(kFirst, hub_.digest() + 1, later_ + seconds(5));
+  hub_.take_digest(kFirst, hub_.digest(), later_ + seconds(5));
+  hub_.take_digest(kFirst, hub_.digest() + 1, later_ + seconds(6));
+  hub_.take_digest(kFirst, hub_.digest() + 1, later_ + seconds(7));
+  EXPECT_EQ(sent(hub_).size(), 3u) << "they were equal in between";
+}
+
+TEST_F(HubWithTwoLinks, PausesBetweenRepairsForAMinuteAtMost) {
+  std::vector<milliseconds> repairs;
+  for (milliseconds now{0}; now < std::chrono::minutes(5); now += milliseconds(250)) {
+    hub_.take_digest(kFirst, hub_.digest() + 1, later_ + now);
+    if (!sent(hub_).empty()) repairs.push_back(now);
+  }
+  ASSERT_GE(repairs.size(), 9u);
+  EXPECT_EQ(repairs[1] - repairs[0], seconds(2));
+  EXPECT_EQ(repairs[5] - repairs[4], seconds(32));
+  EXPECT_EQ(repairs[6] - repairs[5], seconds(60));
+  EXPECT_EQ(repairs[8] - repairs[7], seconds(60));
+}
+
+TEST_F(HubWithTwoLinks, AnswersAnOlderRecordOfAHubThatItCannotReach) {
+  hub_.take_record(kSecond, bytes(identity(9, 99), 2), later_);
+  EXPECT_EQ(sent(hub_), (Sent{{1, 9}}));
+  hub_.take_record(kFirst, bytes(identity(9, 99), 1), later_);
+  EXPECT_EQ(sent(hub_), (Sent{{1, 9}})) << "repairs leave it out";
+  hub_.take_record(kFirst, bytes(identity(9, 99), 2), later_);
+  EXPECT_EQ(sent(hub_), Sent{}) << "they are equal";
+  hub_.take_record(kFirst, bytes(three_, 0), later_);
+  EXPECT_EQ(sent(hub_), Sent{}) << "a repair brings it";
+}
+
+TEST_F(HubWithTwoLinks, NamesTheLinkThatBringsTooManyRecordsOnceAMinute) {
+  const auto crowd = [this](LinkNumber link, std::uint8_t from, std::uint8_t to) {
+    for (std::uint8_t unique = from; unique <= to; ++unique)
+      hub_.take_record(link, bytes({hub_key(7, unique), proto::HubInstance{1}, true}, 1), later_);
+    return hub_.take_crowding();
+  };
+  EXPECT_FALSE(crowd(kFirst, 1, RecordStore::kRecordsOfOneId));
+  EXPECT_EQ(crowd(kSecond, 100, 100), kSecond);
+  EXPECT_FALSE(crowd(kFirst, 101, 101));
+  later_ += NetworkState::kCrowdedPause;
+  EXPECT_EQ(crowd(kFirst, 102, 103), kFirst);
+  EXPECT_FALSE(hub_.take_crowding());
 }
 
 TEST_F(HubWithTwoLinks, ComputesAtOnceAndThenEach50Ms) {

@@ -94,21 +94,72 @@ TEST(RecordStoreTake, ReadsNoPartThatIsTooLargeOrMalformed) {
   EXPECT_EQ(read_part(proto::encode(proto::route::RecordsEnd{})), nullptr);
 }
 
-TEST(RecordStoreLimit, TakesSoManyRecordsOfOneHubId) {
+/// A record of hub id 5.
+PartRef one_of_five(std::uint8_t unique, std::uint64_t sequence = 1) {
+  return part({hub_key(5, unique), proto::HubInstance{1}, true}, sequence);
+}
+
+TEST(RecordStoreLimit, OfOneHubIdTheOneThatWasLostFirstGoes) {
   RecordStore store;
-  const auto nth = [](std::uint8_t unique) {
-    return part({hub_key(5, unique), proto::HubInstance{1}, true}, 1);
-  };
   for (std::uint8_t unique = 1; unique <= RecordStore::kRecordsOfOneId; ++unique) {
-    EXPECT_EQ(store.take(nth(unique), kNow), Taken::newer);
+    EXPECT_EQ(store.take(one_of_five(unique), kNow + milliseconds{unique}), Taken::newer);
   }
-  EXPECT_EQ(store.take(nth(200), kNow), Taken::too_many);
+  EXPECT_EQ(store.too_many(), 0u);
+  store.set_linked({hub_key(5, 1)});
+  store.set_reachable(std::vector{hub_key(5, 2)}, kNow);
+  EXPECT_EQ(store.take(one_of_five(200), kNow + minutes(1)), Taken::newer);
+  EXPECT_EQ(store.too_many(), 1u);
+  EXPECT_NE(store.find(hub_key(5, 1)), nullptr) << "it is linked";
+  EXPECT_NE(store.find(hub_key(5, 2)), nullptr) << "it can be reached";
+  EXPECT_EQ(store.find(hub_key(5, 3)), nullptr);
+  EXPECT_NE(store.find(hub_key(5, 4)), nullptr);
+  EXPECT_EQ(store.take(one_of_five(4, 2), kNow), Taken::newer) << "one that is known";
+  EXPECT_EQ(store.too_many(), 1u);
+}
+
+TEST(RecordStoreLimit, WhereAllOfOneHubIdCanBeReachedOnlyALinkedHubIsTaken) {
+  RecordStore store;
+  std::vector<proto::HubKey> all;
+  for (std::uint8_t unique = 1; unique <= RecordStore::kRecordsOfOneId; ++unique) {
+    store.take(one_of_five(unique), kNow);
+    all.push_back(hub_key(5, unique));
+  }
+  store.set_reachable(all, kNow);
+  EXPECT_EQ(store.take(one_of_five(200), kNow), Taken::too_many);
   EXPECT_EQ(store.too_many(), 1u);
   EXPECT_EQ(store.take(part(identity(6, 1), 1), kNow), Taken::newer) << "another hub id";
-  EXPECT_EQ(store.take(part({hub_key(5, 1), proto::HubInstance{1}, true}, 2), kNow), Taken::newer)
-      << "one that is known";
-  store.put_own(nth(200));
-  EXPECT_NE(store.find(hub_key(5, 200)), nullptr) << "others cannot take its place away";
+  store.set_linked({hub_key(5, 200)});
+  EXPECT_EQ(store.take(one_of_five(200), kNow), Taken::newer);
+  store.put_own(one_of_five(201));
+  EXPECT_NE(store.find(hub_key(5, 201)), nullptr) << "others cannot take its place away";
+}
+
+TEST(RecordStoreLimit, RecordsOfLostHubsMakeRoomForOthers) {
+  RecordStore store;
+  const auto nth = [](std::uint64_t number) {
+    proto::HubKey key{HubId{static_cast<std::uint16_t>(100 + number % 3'000)}, {}};
+    store_le(reinterpret_cast<std::byte*>(key.unique.bytes.data()), number);
+    auto record = said({key, proto::HubInstance{1}, true}, 1);
+    record.name = std::string(255, 'n');
+    return make_part(record);
+  };
+  store.take(part(identity(1, 1), 1), kNow);
+  store.take(part(identity(2, 1), 1), kNow);
+  store.set_reachable(std::vector{hub_key(1)}, kNow);
+  store.set_linked({hub_key(2)});
+  std::uint64_t taken = 0;
+  while (store.too_many() == 0) {
+    ASSERT_EQ(store.take(nth(taken), kNow + milliseconds(taken)), Taken::newer);
+    ++taken;
+    ASSERT_LT(taken, RecordStore::kUnreachableBytesMax / 256);
+  }
+  EXPECT_GT(taken, RecordStore::kUnreachableBytesMax / 1'024) << "as many as have room";
+  EXPECT_NEAR(static_cast<double>(store.records().size()), static_cast<double>(taken) / 2, 4);
+  EXPECT_NE(store.find(nth(taken - 1)->said.hub), nullptr) << "the newest is there";
+  EXPECT_EQ(store.find(nth(0)->said.hub), nullptr);
+  EXPECT_NE(store.find(hub_key(1)), nullptr) << "it can be reached";
+  EXPECT_NE(store.find(hub_key(2)), nullptr) << "it is linked";
+  EXPECT_EQ(store.reachable().size(), 1u);
 }
 
 TEST(RecordStoreForget, ThrowsAwayHubsThatCouldNotBeReachedForTenMinutes) {
