@@ -135,8 +135,8 @@ def found_by_fuzzer(bug: Bug, program: pathlib.Path, build: pathlib.Path) -> boo
 
 
 def found_by_simulation(bug: Bug, program: pathlib.Path) -> bool:
-    answer = subprocess.run([program, "--seeds", "500", "--expect", *bug.argument.split()], capture_output=True,
-                            text=True, check=False)
+    answer = subprocess.run([program, "--seeds", "500", "--expect", bug.argument], capture_output=True, text=True,
+                            check=False)
     if answer.returncode != 0:
         print(answer.stdout[-2000:], answer.stderr[-2000:])
     return answer.returncode == 0

@@ -13,7 +13,7 @@ def main():
 
     answer = subprocess.run([program, "--checkers"], capture_output=True, text=True, check=True)
     checkers = set(answer.stdout.split())
-    found = {bug.argument.split()[0] for bug in planted.load() if bug.program == pathlib.Path(program).name}
+    found = {bug.argument for bug in planted.load() if bug.program == pathlib.Path(program).name}
     for name in sorted(checkers - found):
         print(f"no bug is planted for the checker {name}")
     for name in sorted(found - checkers):

@@ -75,7 +75,7 @@ class NameCopies {
     std::size_t bytes_max = std::size_t{64} << 20;  ///< 1 MiB at least
   };
   static constexpr std::size_t kMarksLeast = 1'024;
-  /// What changed at a hub that was away comes within that time.
+  /// Changes of a hub that was away come within that time.
   static constexpr std::chrono::milliseconds kCatchUp = std::chrono::seconds(1);
 
   explicit NameCopies(const Options& options);
