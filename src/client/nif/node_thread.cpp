@@ -108,7 +108,7 @@ bool NodeThread::take_over(Admitted admitted, bool first) {
   session_ = std::move(admitted.session);
   if (!first) parts_.outbound.begin_declaring();  // until declare_again() below knows better
   // Before anything can be posted: a total of the earlier connection would count as one of this.
-  parts_.credits.begin(session_.resumed);
+  parts_.credits.begin(session_);
   const auto let_go = parts_.outbound.attach(*stream_, session_);
   if (!let_go) return false;
   parts_.id.store(session_.id, std::memory_order_relaxed);  // a number by itself
