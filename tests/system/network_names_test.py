@@ -214,7 +214,7 @@ class Losers(Case):
         added = run_gimnet(f"unix:{second.socket_path}", "ctl", "link", "add", first.url)
         self.assertEqual(added.code, 0, added.err)
         self.assertEqual(loses.wait(), 3)
-        self.assertIn("has the name and the better claim to it", loses.err)
+        self.assertIn("has the name, since its id is the lower one", loses.err)
         self.assertIn("connect under another name", loses.err)
         sent = run_gimnet(second, "send", "robot", data=b"one\n")
         self.assertEqual((sent.code, keeps.wait()), (0, 0), sent.err + keeps.err)
