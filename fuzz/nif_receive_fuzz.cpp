@@ -62,6 +62,7 @@ class Witness final : public InboundHost {
     note("moved " + event.name);
     return event.provider != NodeId{};
   }
+  bool is_own_service(const std::string& name) override { return name.starts_with("own/"); }
   bool on_watch_events(const proto::ns::WatchEvents& events) override {
     note("watched " + std::to_string(events.watch));
     return true;

@@ -86,6 +86,7 @@ class World final : public nif::InboundHost {
   std::vector<nif::Item> on_answer(proto::Kind, const proto::ControlView&) override { return {}; }
   [[nodiscard]] bool on_service_moved(const proto::ns::ServiceMoved&) override { return false; }
   bool on_watch_events(const proto::ns::WatchEvents&) override { return false; }
+  bool is_own_service(const std::string&) override { return false; }
   void on_taken(std::uint32_t, const proto::Taken&) override {}
   bool on_report(const proto::Report&) override { return true; }
   [[nodiscard]] std::optional<nif::ReportedMessages::Start> message_of(

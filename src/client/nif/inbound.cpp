@@ -359,7 +359,7 @@ Inbound::Verdict Inbound::take_name_lost(std::span<const std::byte> payload) {
   Record* record = make_event(NIF_NAME_LOST, event->name);
   record->incoming.from = event->holder.value();
   add_record(record, event->name.size());
-  if (event->name.find('/') != std::string::npos) return Verdict::going;  // an own service
+  if (host_.is_own_service(event->name)) return Verdict::going;
   goodbye_ = {proto::GoodbyeCode::replaced, event->sentence};
   return Verdict::goodbye;
 }

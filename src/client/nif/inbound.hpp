@@ -36,6 +36,8 @@ class InboundHost {
   [[nodiscard]] virtual bool on_service_moved(const proto::ns::ServiceMoved& event) = 0;
   /// True: the program is to have it.
   [[nodiscard]] virtual bool on_watch_events(const proto::ns::WatchEvents& events) = 0;
+  /// It is the full name of a service of this node, and not the name of a node.
+  [[nodiscard]] virtual bool is_own_service(const std::string& name) = 0;
   virtual void on_taken(std::uint32_t from, const proto::Taken& taken) = 0;
   /// True: the program did not ask for this report.
   virtual bool on_report(const proto::Report& report) = 0;

@@ -68,6 +68,9 @@ class Node final : private InboundHost {
                                             const proto::ControlView& answer) override;
   bool on_service_moved(const proto::ns::ServiceMoved& event) override;
   [[nodiscard]] bool on_watch_events(const proto::ns::WatchEvents& events) override;
+  [[nodiscard]] bool is_own_service(const std::string& name) override {
+    return parts_.record.is_own_service(name);
+  }
   void on_taken(std::uint32_t from, const proto::Taken& taken) override;
   bool on_report(const proto::Report& report) override;
   [[nodiscard]] std::optional<ReportedMessages::Start> message_of(

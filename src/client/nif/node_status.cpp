@@ -90,6 +90,12 @@ void NodeStatus::set_name(const std::string& name, std::vector<std::byte> token)
   new_name_ = NewName{name, std::move(token)};
 }
 
+bool NodeStatus::is_own_service(const std::string& name) {
+  const MutexLock lock(mutex_);
+  const std::string own{info_.name};
+  return !own.empty() && name.starts_with(own + '/');
+}
+
 std::optional<NodeStatus::NewName> NodeStatus::take_new_name() {
   const MutexLock lock(mutex_);
   return std::exchange(new_name_, std::nullopt);

@@ -39,6 +39,8 @@ class NodeStatus {
   };
   /// The hub registered this node under another name, "" for none.
   void set_name(const std::string& name, std::vector<std::byte> token) GIMNET_EXCLUDES(mutex_);
+  /// That begins with the own name and '/'.
+  [[nodiscard]] bool is_own_service(const std::string& name) GIMNET_EXCLUDES(mutex_);
   /// The name that the library's thread has not seen to yet.
   [[nodiscard]] std::optional<NewName> take_new_name() GIMNET_EXCLUDES(mutex_);
 

@@ -185,8 +185,7 @@ void NetworkNames::let_go(const KnownName& winner, const Told& told, Effects& ef
   const std::string name{winner.name};
   const std::string sentence = "node " + to_string(winner.claim->node) + " of " +
                                hub_text(exchange_->copies(), winner.hub) + " has the name, since " +
-                               reason(*exchange_->copies().own_claim(name), *winner.claim) +
-                               "; choose another name";
+                               reason(*exchange_->copies().own_claim(name), *winner.claim);
   std::string way;
   if (told.hops != nullptr)
     way = "; that hub is reached over the link to hub " +

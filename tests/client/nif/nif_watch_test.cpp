@@ -46,16 +46,16 @@ TEST(NifWatch, TakesANameAndLosesItToANodeOfAnotherHub) {
   std::atomic<bool> has_name{false};
   converse(
       [node, &has_name] {
-        EXPECT_EQ(nif_register(node, "forklift", NIF_FOREVER), NIF_OK);
+        EXPECT_EQ(nif_register(node, "hall/forklift", NIF_FOREVER), NIF_OK);
         nif_info info{};
         info.struct_size = sizeof info;
         EXPECT_EQ(nif_get_info(node, &info), NIF_OK);
-        EXPECT_STREQ(info.name, "forklift");
+        EXPECT_STREQ(info.name, "hall/forklift");
         has_name = true;
         nif_incoming in{};
         ASSERT_EQ(nif_receive(node, &in, NIF_FOREVER), NIF_OK);
         EXPECT_EQ(in.type, static_cast<std::uint32_t>(NIF_NAME_LOST));
-        EXPECT_STREQ(in.text, "forklift");
+        EXPECT_STREQ(in.text, "hall/forklift");
         EXPECT_EQ(in.from, kPeerId);
         nif_release(&in);
         ASSERT_EQ(nif_receive(node, &in, NIF_FOREVER), NIF_OK);
@@ -70,13 +70,13 @@ TEST(NifWatch, TakesANameAndLosesItToANodeOfAnotherHub) {
         std::uint16_t number = 0;
         const auto request = connected.hub.next_request<ns::RegisterName>(number);
         ASSERT_TRUE(request);
-        EXPECT_EQ(request->name, "forklift");
+        EXPECT_EQ(request->name, "hall/forklift");
         connected.hub.send_control(
             proto::Kind::ns,
-            proto::encode_answer(ns::RegisterNameAnswer{"forklift", {std::byte{1}}}, number));
+            proto::encode_answer(ns::RegisterNameAnswer{"hall/forklift", {std::byte{1}}}, number));
         while (!has_name) std::this_thread::yield();
         connected.hub.send_control(
-            proto::Kind::ns, proto::encode(ns::NameLost{"forklift", NodeId{kPeerId}, "late"}));
+            proto::Kind::ns, proto::encode(ns::NameLost{"hall/forklift", NodeId{kPeerId}, "late"}));
       });
 }
 

@@ -36,6 +36,15 @@ TEST(NodeStatus, ANewNameIsTakenOnce) {
   EXPECT_FALSE(record.take_new_name());
 }
 
+TEST(NodeStatus, KnowsTheNamesOfOwnServices) {
+  NodeStatus record;
+  EXPECT_FALSE(record.is_own_service("/pose"));
+  record.connected(session_of("hall/robot"), true);
+  EXPECT_TRUE(record.is_own_service("hall/robot/pose"));
+  EXPECT_FALSE(record.is_own_service("hall/robot"));
+  EXPECT_FALSE(record.is_own_service("hall/robots/pose"));
+}
+
 TEST(NodeStatus, EndsForGood) {
   NodeStatus record;
   record.connected(session_of("robot"), true);

@@ -38,6 +38,7 @@ class RecordingHost final : public InboundHost {
     return moved_is_news;
   }
   [[nodiscard]] bool on_watch_events(const proto::ns::WatchEvents&) override { return true; }
+  [[nodiscard]] bool is_own_service(const std::string&) override { return false; }
   void on_taken(std::uint32_t, const proto::Taken& taken) override {
     taken_received.push_back(taken);
   }
