@@ -233,7 +233,7 @@ class Nodes(TwoNodes):
             (gimnet.BadArgument, "rate", lambda: self.viewer.subscribe("robot/pose", rate_hz=float("nan"))),
             (gimnet.BadArgument, "rate_hz is 0", lambda: self.viewer.subscribe("robot/pose", rate_hz=0)),
             (gimnet.BadArgument, "queue is 0", lambda: self.viewer.subscribe("robot/pose", queue=0)),
-            (gimnet.NotFound, "is that of a service", lambda: self.viewer.find("robot/pose")),
+            (gimnet.NotFound, "that of a service of the node 'robot'", lambda: self.viewer.find("robot/pose")),
             (TypeError, "such as (1, 0)", lambda: self.robot.advertise("y", key=1)),
             (gimnet.BadArgument, "(-1, 0)", lambda: self.robot.advertise("y", key=(-1, 0))),
             (gimnet.BadArgument, "a time of -1 s", lambda: accepted.receive(-1)),

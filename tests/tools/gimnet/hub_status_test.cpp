@@ -59,7 +59,7 @@ TEST(HubStatus, IsWrittenAsJson) {
   EXPECT_NE(
       json.find(
           R"("connected":true,"queued_bytes":9,"accepted":100,"received_bytes":1200,"delivered":20,)"
-          R"("sent_bytes":320,"dropped":3})"),
+          R"("sent_bytes":320,"dropped":3,"missed":0})"),
       std::string::npos)
       << json;
 }
@@ -71,7 +71,7 @@ TEST(HubStatus, IsWrittenForPeople) {
       << text;
   EXPECT_NE(text.find("dropped.away: 1"), std::string::npos);
   EXPECT_NE(text.find("7.1  robot"), std::string::npos);
-  EXPECT_NE(text.find("connected  100       20         3        9"), std::string::npos) << text;
+  EXPECT_NE(text.find("connected  100       20         3        0       9"), std::string::npos) << text;
 }
 
 }  // namespace

@@ -63,10 +63,13 @@ Result<ns::ResolveAnswer, proto::Refusal> resolve(const HandlerContext& context,
     return ns::ResolveAnswer{make_id(context.facts.id, *index),
                              connected ? ns::NameStanding::held : ns::NameStanding::away, learning};
   }
-  if (name.find('/') != std::string_view::npos) {
+  const Topic* topic = context.membership.topics().find(name);
+  const auto claim = copies == nullptr ? std::nullopt : copies->find(name);
+  if ((topic != nullptr && topic->provided()) || (claim && claim->claim->service)) {
     return proto::Refusal{Status::not_found,
                           "no node has the name '" + escaped(name, kQuotedMax) +
-                              "': a name with '/' is that of a service",
+                              "': it is that of a service of the node '" +
+                              escaped(name.substr(0, name.rfind('/')), kQuotedMax) + "'",
                           learning};
   }
   return proto::Refusal{Status::not_found,

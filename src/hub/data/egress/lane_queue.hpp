@@ -39,14 +39,13 @@ class LaneQueue {
   /// Has the sender less than its equal share of the half that BLOCK has in a lane of `bytes_max`,
   /// with so many bytes more? Then it is let in, though others fill the lane: those who refill it
   /// first would have all of it.
-  [[nodiscard]] bool is_within_share(NodeId sender, std::uint32_t bytes,
-                                     std::uint64_t bytes_max) const {
-    return sources_.fixed(SourceBytes::place_of(sender)) + bytes <= block_share(bytes_max);
+  [[nodiscard]] bool is_within_share(NodeId sender, std::uint32_t bytes, std::uint64_t bytes_max) {
+    return sources().fixed(SourceBytes::place_of(sender)) + bytes <= block_share(bytes_max);
   }
   /// The senders that need not pause any more, as bits of their places in SourceBytes: all once
   /// half of their bytes went, or those that have half of their share.
-  [[nodiscard]] std::uint32_t places_with_room(std::uint64_t bytes_max) const {
-    return sources_.below(block_bytes_ <= bytes_max / 4 ? UINT64_MAX : block_share(bytes_max) / 2);
+  [[nodiscard]] std::uint32_t places_with_room(std::uint64_t bytes_max) {
+    return sources().below(block_bytes_ <= bytes_max / 4 ? UINT64_MAX : block_share(bytes_max) / 2);
   }
   /// Bytes that still fit in a lane of `bytes_max`: of messages sent with BLOCK into half of it, of
   /// others into what those leave, at least the other half.
@@ -146,8 +145,8 @@ class LaneQueue {
   void trim();
 
  private:
-  [[nodiscard]] std::uint64_t block_share(std::uint64_t bytes_max) const {
-    return bytes_max / 2 / sources_.fixed_sources();
+  [[nodiscard]] std::uint64_t block_share(std::uint64_t bytes_max) {
+    return bytes_max / 2 / sources().fixed_sources();
   }
   using StreamIndex = FlatMap<LatestStream, std::uint64_t>;
   using MessageIndex = FlatMap<std::uint64_t, std::uint64_t>;  ///< sender and message to entry

@@ -339,7 +339,7 @@ void Outbox::admit_to_full(Entry entry, const proto::FrameHeader& header, Egress
 bool Outbox::ask_to_pause(const Entry& entry, const proto::FrameHeader& header,
                           EgressContext& context) {
   const std::size_t lane_index = header.lane & proto::kLaneMask;
-  const LaneQueue& lane = lanes_->queues[lane_index];
+  LaneQueue& lane = lanes_->queues[lane_index];
   const std::uint64_t lane_bytes = context.limits.lane_bytes(lane_index);
   const bool scarce = backlog_ && context.budget.scarce();
   if (!scarce && lane.is_within_share(NodeId{header.src}, entry.size, lane_bytes)) return true;

@@ -63,11 +63,13 @@ TEST(Outbox, BlockPausesOnceHoldsPastTheReserveAndLetsGo) {
   EXPECT_THAT(rig.signals.take(), ElementsAre("pause 1"));
   for (int i = 0; i < 15; ++i) rig.push(connection.outbox, sized(kKiB));
   EXPECT_THAT(rig.signals.take(), IsEmpty()) << "within the reserve";
+  for (int i = 0; i < 4; ++i) rig.push(connection.outbox, sized(kKiB), {.src = 2});
+  EXPECT_THAT(rig.signals.take(), IsEmpty()) << "within its share, half of what BLOCK may have";
   rig.push(connection.outbox, sized(kKiB), {.src = 2});
   EXPECT_THAT(rig.signals.take(), ElementsAre("pause 2", "hold 2"));
   rig.push(connection.outbox, "", {.src = 1});
   EXPECT_THAT(rig.signals.take(), ElementsAre("hold 1"));
-  EXPECT_EQ(rig.tally.queued, 1 + 8 + 1 + 15 + 1 + 1);
+  EXPECT_EQ(rig.tally.queued, 1 + 8 + 1 + 15 + 5 + 1);
   connection.peer.set_room(MemoryPeer::kAll);
   connection.flush();
   EXPECT_THAT(rig.signals.take(), ElementsAre("resume 1", "release 1", "resume 2", "release 2"));
