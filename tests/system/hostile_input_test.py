@@ -203,7 +203,7 @@ class Frames(HostileInput):
         self.assertEqual(receiver.next_data().payload, b"whole")
 
     def test_flow_that_is_unknown_or_too_short(self):
-        for payload in (b"", b"\x01", b"\x00" * 16, b"\x09" + bytes(15), b"\xff" + bytes(15), b"\x04" + bytes(6),
+        for payload in (b"", b"\x01", b"\x00" * 16, b"\x0a" + bytes(15), b"\x09" + bytes(14), b"\xff" + bytes(15), b"\x04" + bytes(6),
                         b"\x06" + bytes(14)):
             self.malformed(dst=0, kind=FLOW, payload=payload)
 

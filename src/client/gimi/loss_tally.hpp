@@ -37,7 +37,7 @@ struct Loss {
       Meaning{"link_lost", "a link between hubs broke on the way, and it did not arrive"},
       Meaning{"link_unsure", "a link between hubs broke on the way, and it may have arrived"},
       Meaning{"hop_limit", "the ways between hubs were changing; try again"},
-      Meaning{"not_allowed", "a hub on the way does not allow it"},
+      Meaning{"not_allowed", "a link between hubs may not carry it"},
   };
   std::string words = "the hub reports " + std::string(reason);
   for (const auto& [name, meaning] : kMeanings) {

@@ -31,7 +31,7 @@ FLOWS = ("", "PING", "PONG", "CREDIT", "PAUSE", "RESUME", "CONFIRM", "SKIP", "DR
 # Keys 15 of WELCOME and 4 of REGISTER's answer said that a name is not provisional: no name is any more.
 VOLATILE = {
     (LINK, HELLO): {(3,), (4,)},
-    (LINK, WELCOME): {(2,), (5,), (10,), (15,), (17,)},
+    (LINK, WELCOME): {(2,), (5,), (7,), (10,), (15,), (17,)},  # 7: a later hub offers more features
     (LINK, GOODBYE): {(2,)},
     (NS, 0x8001): {(4,), (5,)},
     (NS, 0x8002): {(5,)},
