@@ -106,8 +106,7 @@ void NameCopies::renumber(HubId hub) {
 std::vector<KnownName> NameCopies::take_lost() {
   std::vector<KnownName> lost;
   for (const std::string& name : std::exchange(lost_, {})) {
-    const auto best = find(name);
-    if (best && is_lost_to(*best)) lost.push_back(*best);
+    if (const auto winner = winner_over_own(name)) lost.push_back(*winner);
   }
   return lost;
 }
@@ -307,7 +306,7 @@ bool NameCopies::is_lost_to(const KnownName& other) const {
 }
 
 void NameCopies::compare_with_own(std::string_view name) {
-  if (const auto best = find(name); best && is_lost_to(*best)) lost_.emplace(name);
+  if (winner_over_own(name)) lost_.emplace(name);
 }
 
 void NameCopies::note_change(Place place, std::optional<NameClaim> before) {
@@ -379,19 +378,12 @@ HubId NameCopies::largest() const {
   return largest;
 }
 
+std::optional<KnownName> NameCopies::winner_over_own(std::string_view name) const {
+  return best_of(name, [this](const KnownName& known) { return is_lost_to(known); });
+}
+
 std::optional<KnownName> NameCopies::find(std::string_view name) const {
-  std::optional<KnownName> best;
-  for (const auto& entry : index_.claims_to(name)) {
-    if (entry.second.state == NameState::deleted) continue;
-    const KnownName known = known_name(entry);
-    const auto reachable = [](const KnownName& one) {
-      return one.standing != proto::ns::NameStanding::unreachable;
-    };
-    if (!best || reachable(known) > reachable(*best) ||
-        (reachable(known) == reachable(*best) && wins(*known.claim, *best->claim)))
-      best = known;
-  }
-  return best;
+  return best_of(name, [](const KnownName&) { return true; });
 }
 
 }  // namespace gimnet::hub

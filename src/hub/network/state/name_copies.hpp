@@ -225,6 +225,26 @@ class NameCopies {
   [[nodiscard]] bool has_room(HubId hub, std::size_t bytes) const;
   [[nodiscard]] std::uint32_t rank_for(std::string_view name, NodeId node) const;
   [[nodiscard]] bool is_lost_to(const KnownName& other) const;
+  /// The best claim that this hub has to give the name up for. Others may be better, and not count
+  /// yet.
+  [[nodiscard]] std::optional<KnownName> winner_over_own(std::string_view name) const;
+  template <class Counts>
+  [[nodiscard]] std::optional<KnownName> best_of(std::string_view name,
+                                                 const Counts& counts) const {
+    std::optional<KnownName> best;
+    for (const auto& entry : index_.claims_to(name)) {
+      if (entry.second.state == proto::route::NameState::deleted) continue;
+      const KnownName known = known_name(entry);
+      if (!counts(known)) continue;
+      const auto reachable = [](const KnownName& one) {
+        return one.standing != proto::ns::NameStanding::unreachable;
+      };
+      if (!best || reachable(known) > reachable(*best) ||
+          (reachable(known) == reachable(*best) && wins(*known.claim, *best->claim)))
+        best = known;
+    }
+    return best;
+  }
   void compare_with_own(std::string_view name);
   void note_change(Place place, std::optional<proto::route::NameClaim> before);
 

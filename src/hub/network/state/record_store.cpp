@@ -152,8 +152,9 @@ bool RecordStore::has_room_for(std::size_t bytes, bool reachable) {
   for (auto each = records_.begin(); each != records_.end(); ++each) {
     if (each->second.unreachable_since && !is_linked(each->first)) lost.push_back(each);
   }
-  std::ranges::stable_sort(lost, {},
-                           [](const auto& each) { return *each->second.unreachable_since; });
+  std::ranges::sort(lost, {}, [](const auto& each) {
+    return std::pair{*each->second.unreachable_since, each->first};
+  });
   for (const auto& each : lost) {
     if (unreachable_bytes_ <= kUnreachableBytesMax / 2 && fits()) break;
     drop(each);
