@@ -58,15 +58,20 @@ class Latest(unittest.TestCase):
             shown = [int(output.readline())]
             while shown[-1] != self.LINES - 1:
                 shown.append(int(output.readline()))
-            missed = self.LINES - shown[0] - len(shown)
+            # Of those before the first one that was shown some may have come, and been overwritten.
+            missed, missed_at_most = self.LINES - shown[0] - len(shown), self.LINES - len(shown)
             self.assertGreater(missed, 0)
 
             def service():
                 return json.loads(run_gimnet(hub, "services", "camera/pose", "--json").out)[0]
-            wait_until(lambda: service()["missed"] == missed, "the hub to know all")
-        slow = [(each["id"], each["missed"]) for each in hub.status()["connections"] if each["missed"]]
-        self.assertEqual(slow, [(service()["missed_most"], missed)])
-        self.assertIn(f"{missed} (most: {slow[0][0]})", run_gimnet(hub, "services").out.decode())
+            wait_until(lambda: missed <= service()["missed"] <= missed_at_most, "the hub to know all")
+
+            def is_named():
+                slow = [(each["id"], each["missed"]) for each in hub.status()["connections"] if each["missed"]]
+                return slow == [(service()["missed_most"], service()["missed"])]
+            wait_until(is_named, "the connection that missed them")
+            told = service()
+            self.assertIn(f"{told['missed']} (most: {told['missed_most']})", run_gimnet(hub, "services").out.decode())
 
 
 class Windows(unittest.TestCase):
