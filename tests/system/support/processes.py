@@ -23,7 +23,7 @@ class Process:
     end()."""
 
     def __init__(self, arguments, stdin=subprocess.DEVNULL, env=None, stdout=subprocess.PIPE):
-        # What a test of a library needs (LD_PRELOAD) is not for programs.
+        # LD_PRELOAD is for a test that loads the library itself, and not for programs.
         unwanted = ("GIMNET_HUB", "GIMNET_PROXY", "STATE_DIRECTORY", "LD_PRELOAD")
         environment = {name: value for name, value in os.environ.items() if name not in unwanted}
         environment.update({"XDG_RUNTIME_DIR": HOME.name, "XDG_STATE_HOME": HOME.name}, **(env or {}))
