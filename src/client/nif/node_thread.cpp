@@ -360,8 +360,8 @@ void NodeThread::end(const Failure& failure, std::string why, proto::GoodbyeCode
   Record* event = make_event(replaced ? NIF_SESSION_REPLACED : NIF_DISCONNECTED, std::move(why));
   event->incoming.reason = static_cast<std::uint32_t>(code);
   event->incoming.flags = replaced ? 0 : NIF_DISCONNECTED_FOR_GOOD;
+  parts_.outbound.end(failure);  // first: whoever has the event finds the calls answer by it
   parts_.push_event(event);
-  parts_.outbound.end(failure);
   parts_.received.end(failure);
 }
 
