@@ -256,7 +256,8 @@ GIMNET_API gimi_status gimi_hub(gimi_handle node, gimi_hub_question question, ui
 
 /** Sends a small message to the library of another node, which answers by itself with `echo` in it
  * (may be NULL). The round trip in ns, in that lane there and back. GIMI_TIMEOUT (lost, or late),
- * GIMI_NOT_DELIVERED (no such node, no way to it). */
+ * GIMI_NOT_DELIVERED (no such node, no way to it), GIMI_DENIED (a link between hubs may not carry
+ * it). */
 GIMNET_API gimi_status gimi_ping(gimi_handle node, gimi_peer to, gimi_lane lane,
                                  const gimi_bytes* echo, int32_t timeout_ms,
                                  int64_t* round_trip_ns);

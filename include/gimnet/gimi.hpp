@@ -314,7 +314,8 @@ class Node : public HubAccess {
 
   /// Sends a small message to the library of another node, which answers by itself with `echo` in
   /// it. The round trip in ns, in that lane there and back. Errors: timeout (lost, or late),
-  /// not_delivered (no such node, no way to it), closed.
+  /// not_delivered (no such node, no way to it), denied (a link between hubs may not carry it),
+  /// closed.
   Outcome<std::int64_t> ping(Peer to, Timeout timeout = Timeout{1000}, Lane lane = Lane::normal,
                              BytesView echo = {}) const {
     std::int64_t round_trip_ns = 0;

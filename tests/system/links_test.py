@@ -235,11 +235,13 @@ class Between(unittest.TestCase):
         start_recv(self, first, "B")
         there = first.wait_for_node("B")["id"]
         self.assertEqual(run_gimnet(third, "ping", there, "-c", "1").code, 0)
-        denied = run_gimnet(second, "send", there, data=b"hello\n")
-        self.assertEqual(denied.code, 6, denied.err)
-        self.assertIn("a link between hubs may not carry it", denied.err)
-        self.assertIn("the hub reports not_allowed", run_gimnet(second, "ping", there, "-c", "1").err)
-        self.assertEqual(first.counter("dropped.not_allowed"), 2)
+        start_gimnet(self, first, "answer", "C/mirror", "--echo")
+        wait_until(lambda: run_gimnet(second, "services", "C/mirror").code == 0, "C/mirror at the other hub")
+        for words in (["send", there], ["ping", there, "-c", "1"], ["trace", there, "-c", "1"], ["request", "C/mirror", "hello"]):
+            denied = run_gimnet(second, *words, data=b"hello\n")
+            self.assertEqual(denied.code, 6, denied.err)
+            self.assertIn("the hub reports not_allowed: a link between hubs may not carry it: see `allow`", denied.err)
+        self.assertEqual(first.counter("dropped.not_allowed"), 4)
         wait_until(lambda: "link to hub 2: dropped a frame of kind 0 whose source is at hub 2: that link may not speak for hub 2"
                    in first.process.err, "the line of its log")
         self.assertEqual(self.states(first), {first.url: "up"})

@@ -9,6 +9,7 @@
 
 #include "gimnet/gimi/node_state.hpp"
 #include "gimnet/gimi/outcome.hpp"
+#include "gimnet/nif_status.h"
 #include "proto/frame/frame_header.hpp"
 
 namespace gimnet::gimi {
@@ -37,7 +38,8 @@ struct Loss {
       Meaning{"link_lost", "a link between hubs broke on the way, and it did not arrive"},
       Meaning{"link_unsure", "a link between hubs broke on the way, and it may have arrived"},
       Meaning{"hop_limit", "the ways between hubs were changing; try again"},
-      Meaning{"not_allowed", "a link between hubs may not carry it"},
+      Meaning{"not_allowed",
+              "a link between hubs may not carry it: see `allow` in their configuration"},
   };
   std::string words = "the hub reports " + std::string(reason);
   for (const auto& [name, meaning] : kMeanings) {
@@ -49,6 +51,11 @@ struct Loss {
 /// The loss that a hub's report of that reason tells; `name` is the reason's.
 [[nodiscard]] inline Loss reported_loss(std::uint32_t reason, std::string_view name) {
   return {reason < 64 ? static_cast<LossReason>(reason) : LossReason::none, report_words(name)};
+}
+
+/// The status of a call whose frame a hub dropped for that reason.
+[[nodiscard]] inline Status dropped_status(std::uint32_t reason) {
+  return reason == NIF_DROP_NOT_ALLOWED ? Status::denied : Status::not_delivered;
 }
 
 /// Counts messages that were lost on their way to this node, by reason. Frames that NIF could not

@@ -5,6 +5,7 @@
 
 #include "base/clock.hpp"
 #include "base/endian.hpp"
+#include "client/gimi/loss_tally.hpp"
 #include "proto/frame/report.hpp"
 
 namespace gimnet::gimi {
@@ -270,7 +271,8 @@ void OpenRequests::on_report(std::uint32_t sequence, std::uint32_t reason,
     Open& open = found->second;
     open.sent = false;
     open.unsure |= reason == NIF_DROP_LINK_UNSURE;
-    Ended otherwise = without_reply(Status::not_delivered, open.ran(), open.service + ": " + words);
+    Ended otherwise =
+        without_reply(dropped_status(reason), open.ran(), open.service + ": " + words);
     if (!may_come_back(reason)) return finish(open, std::move(otherwise));
     // It waits as long as it may for a node that is only away.
     if (reason == NIF_DROP_AWAY) open.give_up_ns = INT64_MAX;

@@ -45,12 +45,12 @@ void PingTable::on_pong(std::uint32_t number, Peer from, std::vector<TraceHop> w
   answered_.notify_all();
 }
 
-void PingTable::on_lost(std::uint32_t number, const std::string& why) {
+void PingTable::on_lost(std::uint32_t number, Failure why) {
   const MutexLock lock(mutex_);
   const auto place = waiting_.find(number);
   if (place == waiting_.end()) return;
-  place->second.answer =
-      Failure{Status::not_delivered, place->second.peer.text() + " cannot be reached: " + why};
+  why.sentence.insert(0, place->second.peer.text() + " cannot be reached: ");
+  place->second.answer = std::move(why);
   answered_.notify_all();
 }
 

@@ -30,8 +30,8 @@ class PingTable {
 
   void on_pong(std::uint32_t number, Peer from, std::vector<TraceHop> way = {})
       GIMNET_EXCLUDES(mutex_);
-  /// The hub could not deliver it.
-  void on_lost(std::uint32_t number, const std::string& why) GIMNET_EXCLUDES(mutex_);
+  /// A hub dropped it, and said why.
+  void on_lost(std::uint32_t number, Failure why) GIMNET_EXCLUDES(mutex_);
   /// No answer comes any more.
   void end(const Ending& ending) GIMNET_EXCLUDES(mutex_);
 

@@ -306,7 +306,7 @@ void Reception::on_report(const nif_incoming& in) {
   }
   if (header && header->operation == proto::gimi::MessageOperation::ping &&
       header->epoch == pings_.epoch()) {
-    pings_.on_lost(header->sequence, report_words(report.text));
+    pings_.on_lost(header->sequence, {dropped_status(in.reason), report_words(report.text)});
   }
   streams_.on_report(report);
 }

@@ -7,8 +7,9 @@
 namespace gimnet::tool {
 
 std::string loss_words(const SendCounts& counts, const std::string& target) {
-  if (counts.loss_reason == LossReason::not_allowed)
-    return counts.loss + ": a link between hubs may not carry it, or the service takes no data";
+  // A hub says the same of a service that took data a moment ago, and takes none any more.
+  if (counts.loss_reason == LossReason::not_allowed && target.find('/') != std::string::npos)
+    return counts.loss + "; or the service takes no data";
   if (counts.loss_reason != LossReason::no_such_node || Peer::parse(target)) return counts.loss;
   return "the hub reports no_such_node: " + target + " has left";
 }

@@ -46,6 +46,12 @@ TEST(ReportWords, SayWhatAReasonMeansWhereItsNameDoesNot) {
   EXPECT_EQ(report_words("too_old"), "the hub reports too_old");
 }
 
+TEST(DroppedStatus, TellsWhatIsForbiddenFromWhatDidNotCome) {
+  EXPECT_EQ(dropped_status(NIF_DROP_NOT_ALLOWED), Status::denied);
+  for (const std::uint32_t reason : {NIF_DROP_NO_ROUTE, NIF_DROP_LINK_UNSURE, NIF_DROP_AWAY})
+    EXPECT_EQ(dropped_status(reason), Status::not_delivered);
+}
+
 TEST(ReportedLoss, IsWhatTheWireSays) {
   const std::pair<LossReason, proto::DropReason> pairs[] = {
       {LossReason::no_such_node, proto::DropReason::no_such_node},

@@ -43,7 +43,7 @@ TEST(PingTable, TakesNoAnswerOfAnother) {
 TEST(PingTable, SaysWhyThereIsNoAnswer) {
   PingTable pings;
   pings.expect(1, kPeer);
-  pings.on_lost(1, "no such node");
+  pings.on_lost(1, {Status::not_delivered, "no such node"});
   const auto answer = pings.wait(1, INT64_MAX, kForever);
   EXPECT_TRUE(answer.is(Status::not_delivered));
   EXPECT_NE(answer.failure().sentence.find("no such node"), std::string::npos);

@@ -32,6 +32,12 @@ TEST(LossWords, SayThatANodeHasLeftThatWasCalledByItsName) {
   EXPECT_EQ(loss_words(counts, "7.17"), counts.loss) << "an id may be wrong";
 }
 
+TEST(LossWords, OfAServiceAForbiddenMessageHasTwoCauses) {
+  const SendCounts counts = lost(LossReason::not_allowed);
+  EXPECT_EQ(loss_words(counts, "robot"), counts.loss);
+  EXPECT_EQ(loss_words(counts, "robot/drive"), counts.loss + "; or the service takes no data");
+}
+
 TEST(LossWords, LeaveOtherReasonsAlone) {
   for (const LossReason reason :
        {LossReason::queue_full, LossReason::no_route, LossReason::not_received}) {
