@@ -109,7 +109,7 @@ void MissedMessages::count(Service& service, std::uint64_t missed, const Message
   }
   const std::uint64_t told = std::min(missed, told_as_lost_);
   told_as_lost_ -= told;
-  cause_of(service, message).missed += missed - told;
+  cause_of(service, missed, message).missed += missed - told;
   untold_ = untold_ || missed != told;
 }
 
@@ -118,9 +118,15 @@ std::uint64_t MissedMessages::skipped(std::string_view service) const {
   return found == services_.end() ? 0 : found->second.skipped.missed;
 }
 
-/// The hub tells of a full queue before it sends what waits in it, and what comes behind the gap.
-MissedMessages::Count& MissedMessages::cause_of(Service& service, const Message& message) {
-  if (std::exchange(service.queue_full, queue_full_) == queue_full_) return service.unknown;
+/// The hub tells of a full queue before it sends what waits in it, and what comes behind the gaps.
+/// It may tell once of several gaps, or of several before the first of them is seen here.
+MissedMessages::Count& MissedMessages::cause_of(Service& service, std::uint64_t missed,
+                                                const Message& message) {
+  if (message.arrival_ns() - service.gap_ns > kOneFloodNs) service.unexplained = 0;
+  service.unexplained += queue_full_ - std::exchange(service.queue_full, queue_full_);
+  if (service.unexplained == 0) return service.unknown;
+  service.unexplained -= std::min(service.unexplained, missed);
+  service.gap_ns = message.arrival_ns();
   if (queue_filled_by_.id == 0 || queue_filled_by_.id == message.from().id) return service.slow;
   flooder_ = queue_filled_by_;
   return service.flooded;

@@ -90,7 +90,9 @@ class MissedMessages {
     std::uint32_t provider = 0;
     std::uint32_t sequence = 0;
     std::uint32_t reconnects = 0;
-    std::uint64_t queue_full = 0;  ///< as take_lost() had told at its last gap
+    std::uint64_t queue_full = 0;   ///< as take_lost() had told at its last gap
+    std::uint64_t unexplained = 0;  ///< of these frames, those that no gap has explained yet
+    std::int64_t gap_ns = 0;        ///< when the last message came that was behind such a gap
     std::uint64_t missed = 0;
     Count early;    ///< before it was subscribed to
     Count broken;   ///< while the connection to the hub was
@@ -99,9 +101,13 @@ class MissedMessages {
     Count flooded;  ///< the same, of what another node sent
     Count unknown;  ///< by all that happens elsewhere
   };
+  /// The longest time between two gaps of one full queue: behind it, frames without a gap were
+  /// other messages.
+  static constexpr std::int64_t kOneFloodNs = 5'000'000'000;
+
   static void add_sentence(std::vector<std::string>& sentences, Count& count,
                            const std::string& service, std::string_view what);
-  Count& cause_of(Service& service, const Message& message);
+  Count& cause_of(Service& service, std::uint64_t missed, const Message& message);
   void count(Service& service, std::uint64_t missed, const Message& message);
 
   const TakeLateness take_lateness_;

@@ -18,6 +18,10 @@ const char* const kUnknown =
     "hub dropped)";
 const char* const kBroken = " of r/s did not come: the connection to the hub was broken";
 
+const char* const kFlooded =
+    " of r/s did not come: the queue of this reader at the hub was full, mostly of what 7.9 sent";
+constexpr Peer kFlooder{7u << 20 | 9};
+
 class MissedMessagesTest : public testing::Test {
  protected:
   std::uint64_t take(std::uint32_t sequence, std::uint32_t reconnects = 0) {
@@ -67,15 +71,44 @@ TEST_F(MissedMessagesTest, WhatIsToldAsLostIsNotToldTwice) {
 
 TEST_F(MissedMessagesTest, WhoWasFloodedIsNotCalledSlow) {
   take(1);
-  missed_.take_lost({.queue_full = 100, .queue_filled_by = Peer{7u << 20 | 9}});
+  missed_.take_lost({.queue_full = 2, .queue_filled_by = kFlooder});
   EXPECT_EQ(take(2), 0u) << "had waited before the gap";
   EXPECT_EQ(take(5), 2u);
-  EXPECT_EQ(missed_.rest(),
-            Sentences{"2 messages of r/s did not come: the queue of this reader at the hub was "
-                      "full, mostly of what 7.9 sent"});
+  EXPECT_EQ(missed_.rest(), Sentences{std::string("2 messages") + kFlooded});
   EXPECT_EQ(take(7), 3u);
   EXPECT_EQ(missed_.rest(), Sentences{std::string("1 message") + kUnknown})
       << "nothing was said of this gap";
+}
+
+TEST_F(MissedMessagesTest, EachGapOfOneFloodHasItsCause) {
+  take(1);
+  // The hub told twice before the first gap was seen.
+  missed_.take_lost({.queue_full = 2, .queue_filled_by = kFlooder});
+  missed_.take_lost({.queue_full = 5, .queue_filled_by = kFlooder});
+  take(4);
+  take(6);
+  EXPECT_EQ(missed_.rest(), Sentences{std::string("3 messages") + kFlooded});
+  take(9);
+  EXPECT_EQ(missed_.rest(), Sentences{std::string("5 messages") + kFlooded});
+  take(11);
+  EXPECT_EQ(missed_.rest(), Sentences{std::string("1 message") + kUnknown})
+      << "all that was told of is found";
+}
+
+TEST_F(MissedMessagesTest, AGapLongAfterAFloodHasAnotherCause) {
+  const auto take_at = [this](std::uint32_t sequence, std::int64_t arrival_s) {
+    gimi_message message = make_message("x", sequence, {}, "r/s").give_up();
+    message.arrival_ns = arrival_s * 1'000'000'000;
+    missed_.take(Message(message));
+  };
+  take_at(1, 100);
+  missed_.take_lost({.queue_full = 100, .queue_filled_by = kFlooder});
+  take_at(3, 130);
+  take_at(5, 135);
+  EXPECT_EQ(missed_.rest(), Sentences{std::string("2 messages") + kFlooded});
+  take_at(7, 141);
+  EXPECT_EQ(missed_.rest(), Sentences{std::string("1 message") + kUnknown})
+      << "most of the 100 frames were others";
 }
 
 TEST_F(MissedMessagesTest, WhoseProviderFilledTheQueueWasTooSlow) {
