@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "base/clock.hpp"
+#include "tools/gimnet/advice.hpp"
 #include "tools/gimnet/session.hpp"
 
 namespace gimnet::tool {
@@ -237,7 +238,7 @@ void ServiceFollower::on_refusal(const Failure& failure) {
     }
     return;
   }
-  say(failure.sentence + "; going on without it");
+  say(in_commands(failure.sentence, "") + "; going on without it");
   const MutexLock lock(mutex_);
   if (const std::string* wanted = matching_.wanted()) matching_.settle(std::string(*wanted));
 }

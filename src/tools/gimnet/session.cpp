@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "base/suggest.hpp"
+#include "tools/gimnet/advice.hpp"
 #include "tools/gimnet/table.hpp"
 
 namespace gimnet::tool {
@@ -230,27 +231,14 @@ ExitCode ToolSession::fail_unknown_service(const std::string& sentence) {
   return fail({Status::not_found, known ? sentence : sentence + nearest_name("service", target)});
 }
 
-std::string ToolSession::words_of(std::string sentence) const {
-  constexpr std::array<std::pair<std::string_view, std::string_view>, 3> kCommands{{
-      {"ask it by request()", "request"},
-      {"subscribe to it", "echo"},
-      {"send to it", "send"},
-  }};
-  for (const auto& [call, command] : kCommands) {
-    if (!sentence.ends_with(call)) continue;
-    sentence.resize(sentence.size() - call.size());
-    return sentence + "use `gimnet " + std::string(command) + " " + options_.target + "`";
-  }
-  return sentence;
-}
-
 ExitCode ToolSession::fail(const Failure& failure) {
   if (stopped()) return exit_code_of_signal(stop_.signal());
   const bool lost = failure.status == Status::not_connected || failure.status == Status::refused;
   const NodeState state = lost && node_ ? node_->state() : NodeState{};
   const bool known =
       !state.trouble.empty() && (state.ended || failure.status == Status::not_connected);
-  say(known ? "lost the connection to the hub: " + state.trouble : words_of(failure.sentence));
+  say(known ? "lost the connection to the hub: " + state.trouble
+            : in_commands(failure.sentence, options_.target));
   return exit_code_of(failure.status);
 }
 

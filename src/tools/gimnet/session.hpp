@@ -95,8 +95,6 @@ class ToolSession {
   /// The target is no service that does what was asked: says so, with the nearest name.
   [[nodiscard]] ExitCode fail_unknown_service(const std::string& sentence);
 
-  /// A sentence of the library with the commands of this tool in place of calls, for the target.
-  [[nodiscard]] std::string words_of(std::string sentence) const;
   /// Prints why something did not work, and gives the code to end with: the signal's, if there was
   /// one.
   [[nodiscard]] ExitCode fail(const Failure& failure);
