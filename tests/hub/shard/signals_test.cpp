@@ -271,5 +271,34 @@ TEST(Signals, WhoSendsToAServiceThatOnlyProvidesIsTold) {
   }
 }
 
+TEST(Signals, WhoseHubALinkMayNotSpeakForIsToldOverIt) {
+  constexpr HubId kNear{20};
+  constexpr HubId kFar{30};
+  const std::uint32_t near_node = make_id<NodeId>(kNear, 3).value();
+  for (const std::size_t shard : {0u, 1u}) {
+    HubRig rig(2);
+    FakeNode& node = rig.join(0);
+    FakeNode& link = rig.link(shard, kNear, {.allow = {kFar}});
+    const auto send = [&](std::uint32_t source, std::uint8_t flags) {
+      rig.send(link, node.id.value(), "hello", {.flags = flags, .src = source});
+    };
+    send(make_id<NodeId>(kFar, 3).value(), proto::kFlagReport);
+    send(near_node, 0);
+    send(node.id.value(), proto::kFlagReport);  // as this hub's own node
+    send(near_node, proto::kFlagReport);
+    rig.settle();
+    rig.pass_ms(100);
+    link.read();
+    EXPECT_THAT(node.frames, SizeIs(1));
+    EXPECT_EQ(rig.dropped(DropReason::not_allowed), 2u);
+    EXPECT_EQ(rig.dropped(DropReason::wrong_source), 1u);
+    ASSERT_THAT(link.reports(), SizeIs(1)) << "of the one that asked for it";
+    EXPECT_EQ(link.reports()[0].reason, DropReason::not_allowed);
+    EXPECT_EQ(link.reports()[0].header.dst, node.id.value());
+    EXPECT_EQ(link.control.back().header.dst, near_node) << "the report goes to the sender";
+    EXPECT_FALSE(link.goodbye) << "the link stays";
+  }
+}
+
 }  // namespace
 }  // namespace gimnet::hub

@@ -79,7 +79,7 @@ void HubRig::attach(FakeNode& node, const JoinSpec& spec, bool new_session) {
   command.peer_resume_bytes = spec.resume_bytes;
   command.peer_frame_bytes = spec.frame_bytes;
   command.told.assign(spec.told.begin(), spec.told.end());
-  if (hub_of(node.id) != hub()) command.link = LinkAttach{{hub()}, 1'000};
+  if (hub_of(node.id) != hub()) command.link = LinkAttach{{hub(), spec.allow}, 1'000};
   node.welcome.reset();
   node.goodbye.reset();
   this->command(node.shard.value(), std::move(command));

@@ -33,6 +33,7 @@ struct JoinSpec {
   std::uint32_t frame_bytes = proto::kFrameLengthDefault;
   std::uint32_t resume_bytes = 1u << 20;
   std::span<const std::byte> told{};  ///< control frames that it gets first
+  std::vector<HubId> allow{};         ///< of a link: as LinkRule has it
 };
 
 /// The sums of the ledger over all shards.
