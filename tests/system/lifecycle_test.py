@@ -5,6 +5,7 @@ import contextlib
 import os
 import select
 import signal
+import subprocess
 import unittest
 
 from support.processes import TCPHUB, Hub, Process, run_gimnet, start_gimnet, start_recv
@@ -168,6 +169,25 @@ class Nodes(unittest.TestCase):
         hub = Hub(self)
         waiting = start_gimnet(self, hub, "echo", "a/b")
         wait_until(lambda: "nobody provides a/b yet" in waiting.err, "the words that it waits")
+
+
+class Killed(unittest.TestCase):
+    def test_a_publisher_goes_on_with_its_next_line(self):
+        hub = Hub(self)
+        reader = start_gimnet(self, hub, "echo", "robot/odom", "--raw")
+        pub = start_gimnet(self, hub, "pub", "robot/odom", "--rate", "200", "--wait", "1", stdin=subprocess.PIPE)
+        pub.feed(b"".join(b"%d\n" % number for number in range(1, 100_000)))
+        for _ in range(2):
+            seen = len(reader.out)
+            wait_until(lambda seen=seen: len(reader.out) > seen + 100, f"lines; pub said: {pub.err}")
+            hub.process.signal(signal.SIGKILL)
+            hub.process.wait()
+            hub = hub.again(self)
+        wait_until(lambda: pub.err.count("connected again") == 2, f"its return; it said: {pub.err}")
+        pub.signal(signal.SIGINT)
+        self.assertEqual(pub.wait(), 130, pub.err)
+        numbers = [int(line) for line in reader.out.split()]
+        self.assertEqual(numbers, sorted(set(numbers)))
 
 
 if __name__ == "__main__":

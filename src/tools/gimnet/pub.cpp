@@ -33,6 +33,8 @@ constexpr Timeout kDrain{10'000};
 constexpr std::int64_t kWhyNs = 1'000'000'000;
 /// The time between two looks at the connection.
 constexpr std::int64_t kLookNs = 200'000'000;
+/// The time until a look after a line that found no connection.
+constexpr std::int64_t kSoonNs = 10'000'000;
 
 /// A connection without which nothing goes on: looks now and then, says what it sees, and waits if
 /// there is none, since publishing would wait without a word.
@@ -58,6 +60,11 @@ class Standing {
       if (!session_.stop().wait_until(std::min(deadline_ns, next_look_ns_))) return false;
     }
     return false;
+  }
+  /// The connection broke after the last look: waits for another one, as stands().
+  [[nodiscard]] bool stands_again() {
+    next_look_ns_ = steady_now_ns() + kSoonNs;
+    return session_.stop().wait_until(next_look_ns_) && stands();
   }
   /// The hub wants this node and has its service; looks at once.
   [[nodiscard]] bool goes_on() { return watch_.goes_on() && publisher_.standing(); }
@@ -101,6 +108,16 @@ Outcome<void> why_refused(ToolSession& session, const Publisher& publisher,
   return sent;
 }
 
+/// Publishes a line, once there is a connection.
+Outcome<void> publish_line(const Publisher& publisher, std::string_view line, More more,
+                           Standing& standing) {
+  for (;;) {
+    auto sent = publisher.publish(line, kForever, more);
+    if (!sent.is(Status::not_connected)) return sent;
+    if (!standing.stands_again()) return standing.outcome();
+  }
+}
+
 Outcome<void> publish_lines(ToolSession& session, const Publisher& publisher, Standing& standing,
                             UnheardLines& unheard, Retaining& retaining) {
   const double rate = session.options().rate_hz;
@@ -116,10 +133,12 @@ Outcome<void> publish_lines(ToolSession& session, const Publisher& publisher, St
     switch (input.next(line)) {
       case LineInput::State::line:
         if (!standing.stands_until(next_ns)) return standing.outcome();
-        next_ns += period_ns;
+        // After a pause of the input or the hub, no burst catches up with the rate.
+        next_ns = std::max(next_ns + period_ns, steady_now_ns() - kLookNs);
         unheard.before_line(publisher.subscribers());
-        if (auto sent = publisher.publish(
-                line, kForever, period_ns == 0 && input.has_line() ? More::yes : More::no);
+        if (auto sent =
+                publish_line(publisher, line,
+                             period_ns == 0 && input.has_line() ? More::yes : More::no, standing);
             sent.is(Status::not_retained)) {
           retaining.look_at(sent);
         } else if (!sent) {
