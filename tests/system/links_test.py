@@ -313,6 +313,8 @@ class Between(unittest.TestCase):
         self.assertRegex(present.out.decode(), "  present      node B 1[.][0-9]+, unreachable")
         echo = run_gimnet(second, "echo", "B/add", "--seconds", "0.1")
         self.assertIn("there is no way to the hub of B/add; waiting for one", echo.err)
+        asked = run_gimnet(second, "request", "B/add", "1")
+        self.assertEqual((asked.code, asked.err), (4, "gimnet: cannot ask B/add: there is no way to its hub at the moment\n"))
         ping = run_gimnet(second, "ping", "B", "-c", "1")
         self.assertEqual(ping.code, 4)
         self.assertIn("the node 'B' is unreachable: there is no way to its hub hub-1; `gimnet hubs` shows when", ping.err)

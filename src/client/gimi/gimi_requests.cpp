@@ -64,6 +64,7 @@ Outcome<void> reach(Core& core, const std::string& service, std::int64_t deadlin
   const std::int64_t give_up_ns =
       std::min(deadline_ns, steady_now_ns() + OpenRequests::kRetryForNs);
   const auto left = [deadline_ns] { return Timeout{nif_timeout_until(deadline_ns)}; };
+  std::optional<Failure> nobody;
   while (!requests.knows(service)) {
     bool answers = true;
     const auto learn = [&](const StreamTable::Stream& stream, const ServicePlace& place) {
@@ -81,13 +82,14 @@ Outcome<void> reach(Core& core, const std::string& service, std::int64_t deadlin
       return Failure{Status::not_found,
                      "cannot ask " + service + ": it takes commands and answers nothing"};
     }
+    if (stream.is(Status::timeout) && nobody) return *nobody;
     if (!stream && !stream.is(Status::not_found)) return stream.failure();
     if (stream && requests.knows(service)) break;
     const std::string node = service.substr(0, service.rfind('/'));
-    if (is_over(give_up_ns) || (!stream && !may_come(core.node(), node, left()))) {
-      return Failure{Status::not_found,
-                     "cannot ask " + service + ": nobody answers there at the moment"};
-    }
+    nobody = Failure{Status::not_found, "cannot ask " + service +
+                                            (stream ? ": there is no way to its hub at the moment"
+                                                    : ": nobody answers there at the moment")};
+    if (is_over(give_up_ns) || (!stream && !may_come(core.node(), node, left()))) return *nobody;
     requests.wait_for_place(service,
                             std::min(give_up_ns, steady_now_ns() + OpenRequests::kRetryNs));
   }
