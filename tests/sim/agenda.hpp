@@ -12,7 +12,7 @@ namespace gimnet::sim {
 /// Simulated time since the world began.
 using Time = std::chrono::microseconds;
 
-/// What is to happen, by time, and for equal times in the order in which it was written down.
+/// Events to come, ordered by time. Events of one time keep the order in which they were added.
 /// Thread safety: none.
 class Agenda {
  public:

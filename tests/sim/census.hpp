@@ -143,7 +143,7 @@ enum class Happening : std::uint8_t {
 };
 inline constexpr std::size_t kHappenings = static_cast<std::size_t>(Happening::count);
 
-/// How often each thing happened. Thread safety: none.
+/// Counts each thing that happened. Thread safety: none.
 class Census {
  public:
   void add(Happening happening) { ++counts_[static_cast<std::size_t>(happening)]; }

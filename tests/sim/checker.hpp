@@ -8,7 +8,8 @@
 
 namespace gimnet::sim {
 
-/// What is checked. Each checker has a planted bug that it must find (planted_bugs.txt).
+/// The properties that are checked. Each has a planted bug that it must find
+/// (tests/planted/bugs.toml).
 enum class Checker : std::uint8_t {
   names,  ///< a name has one owner, who keeps it as long as the protocol says
   ids,  ///< no id of a node or group is given out while its former holder may come back or be sent

@@ -2,8 +2,8 @@
 
 #include "tests/sim/checks.hpp"
 
-// What the shards are told of pace, against what the reference model says that subscribers are
-// owed.
+// Compares the paces that the shards were told with those that the reference model owes to
+// subscribers.
 
 namespace gimnet::sim {
 

@@ -15,7 +15,7 @@ namespace gimnet::sim {
 class HubLife {
  public:
   static constexpr HubId kHub{7};
-  /// What it needs of the world.
+  /// The parts of the world that it needs.
   struct Around {
     Network& network;
     std::function<void()> conductor_wanted;
@@ -30,7 +30,7 @@ class HubLife {
     proto::Hello hello;
     hub::Identity identity;
   };
-  /// Where a program comes from: users over a Unix socket, and most others from one machine.
+  /// The origin of a program: users come over a Unix socket, most others from one machine.
   [[nodiscard]] static hub::PeerInfo peer_of(const hub::Identity& identity, std::uint32_t node,
                                              std::uint64_t wire);
   /// Returns why it is refused. `number` is for the session, if it is a new one.
@@ -51,7 +51,7 @@ class HubLife {
   [[nodiscard]] hub::Conductor& conductor() { return conductor_; }
   [[nodiscard]] SimShards& shards() { return shards_; }
   [[nodiscard]] const Model& model() const { return model_; }
-  /// What all clocks of walls show.
+  /// The time that every wall clock shows.
   [[nodiscard]] static std::int64_t wall_ns(const Setting& setting) {
     return kWallNs + std::chrono::nanoseconds{setting.agenda.now()}.count();
   }
@@ -60,7 +60,7 @@ class HubLife {
   static constexpr std::int64_t kWallNs = 1'800'000'000'000'000'000;
   void trace_sent();
   void after_step();
-  /// What the hub reads when it is asked to read its configuration again.
+  /// The result of reading the configuration again.
   [[nodiscard]] hub::Reloading read_again();
 
   Setting& setting_;

@@ -138,7 +138,7 @@ void print_failure(const World::Options& world, const Report& report) {
   std::printf("again: ./dev sim %s --trace\n", arguments_of(world).c_str());
 }
 
-/// What breaks is looked for in the smallest world that breaks in the same way.
+/// Finds and prints the smallest world that breaks in the same way.
 void print_smallest(const World::Options& world, const Report& report) {
   const Shrunk smallest = shrink(world, report);
   std::printf("smaller, of %" PRIu64 " worlds that were tried, after %" PRIu64

@@ -24,7 +24,7 @@ namespace gimnet::sim {
 
 using std::chrono::milliseconds;
 
-/// What somebody has to be told: the present state of that service.
+/// An event that somebody must be told: the present state of that service.
 struct DueEvent {
   std::uint32_t to = 0;  ///< node index
   std::uint16_t operation = 0;
@@ -62,7 +62,7 @@ struct GivenIds {
   [[nodiscard]] bool few_left() const { return kEveryIndex - 1 - old < 1'000; }
 };
 
-/// What outlives the hub: tokens that nodes hold, and the indices that it must not give to
+/// The part of a hub that outlives it: tokens that nodes hold, and indices that must not go to
 /// newcomers any more.
 struct Past {
   std::map<std::vector<std::byte>, GivenToken> tokens;
@@ -119,7 +119,7 @@ class Model final : public Witness {
     std::uint64_t stream = 0;  ///< of all, never given twice; 0: nobody provides it
     [[nodiscard]] bool provided() const { return provider != 0; }
   };
-  /// What a subscriber wants of a service at most; 0: without a bound.
+  /// The most that a subscriber wants of a service; 0: without a bound.
   struct Terms {
     std::uint32_t window = 0;
     std::uint32_t depth = 1;
@@ -142,14 +142,14 @@ class Model final : public Witness {
   };
   /// n of sync(n); 0: a service without.
   [[nodiscard]] static std::uint32_t window_of(const proto::ns::Advertise& terms);
-  /// What the hub owes that subscriber; nothing: all that comes.
+  /// The pace that the hub owes that subscriber; nothing: every message.
   [[nodiscard]] static std::optional<Terms> pace_of(const Topic& topic, std::uint32_t subscriber);
-  /// What that subscriber is told of a service, but for the provider's session.
+  /// The state that the subscriber is told of a service, except for the provider's session.
   [[nodiscard]] proto::ns::ServiceState state_of(const Topic& topic,
                                                  std::uint32_t subscriber) const;
   using Topics = std::map<std::string, Topic>;
 
-  // What the conductor was told, and what it made of it
+  // Events that the conductor was told, and their results
   struct Hello {
     const proto::Hello& hello;
     bool may_administer = false;
@@ -177,7 +177,7 @@ class Model final : public Witness {
   void draining() { draining_ = true; }
   /// An administrator asked for it.
   [[nodiscard]] bool drain_wanted() const { return drain_wanted_; }
-  /// What a RELOAD would read now; nothing: something is wrong with it.
+  /// The limits that a RELOAD would read now; nothing: the configuration is wrong.
   void configuration(const std::optional<hub::Limits>& limits) { configuration_ = limits; }
   [[nodiscard]] const hub::Limits& limits() const { return limits_; }
   /// Former and present index of those that were given another one since this was last asked.
@@ -186,7 +186,7 @@ class Model final : public Witness {
 
   /// Does the hub know the connection by which this came?
   [[nodiscard]] const Session* known(const hub::SessionRef& session, NodeId node) const;
-  /// What has to be told of this step, each once; those who are not connected are told nothing.
+  /// The events of this step, each once. Nodes that are not connected are told nothing.
   [[nodiscard]] std::vector<DueEvent> take_due();
 
   [[nodiscard]] const std::map<std::uint32_t, Session>& sessions() const { return sessions_; }
@@ -222,7 +222,7 @@ class Model final : public Witness {
   [[nodiscard]] std::uint64_t retained_stream(std::uint32_t group) const override;
 
  private:
-  /// What must become of a HELLO.
+  /// The answer that a HELLO must get.
   struct Verdict {
     std::optional<proto::GoodbyeCode> refusal;
     std::uint32_t session = 0;              ///< that is there and whose token it is; 0: none
@@ -236,7 +236,7 @@ class Model final : public Witness {
   [[nodiscard]] std::optional<proto::GoodbyeCode> judge_name(const std::string& name,
                                                              std::uint32_t claimant) const;
   void make_way(const Hello& hello, const Verdict& verdict, milliseconds now);
-  /// How many sessions there may be once somebody of that role was let in.
+  /// The most sessions there may be after a node of that role was let in.
   [[nodiscard]] std::uint64_t places_for(proto::Role role) const;
   /// Would there be no place for it even when all have made way who do?
   [[nodiscard]] bool is_full_for(const Hello& hello) const;
@@ -300,7 +300,7 @@ class Model final : public Witness {
   void judge_service_list(const Asked& asked);
   void judge_connections(const Asked& asked);
   void judge_advertise(const Asked& asked);
-  /// What is wrong with how a service is to be delivered.
+  /// The fault of a service's delivery terms, or ok.
   [[nodiscard]] proto::Status judge_delivery(const proto::ns::Advertise& offer) const;
   [[nodiscard]] bool terms_fit(const proto::ns::Subscribe& wanted) const;
   void change_terms(Topic& topic, std::uint32_t subscriber, const Terms& terms);
@@ -317,7 +317,7 @@ class Model final : public Witness {
     return make_id<GroupId>(hub_, index);
   }
 
-  /// Where a node went, and the number of the tokens that it had there.
+  /// The place to which a node went, and the number of its tokens there.
   struct Moved {
     std::uint32_t index = 0;
     std::uint64_t token_number = 0;

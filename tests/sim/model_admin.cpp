@@ -3,7 +3,7 @@
 #include "proto/control/ctrl.hpp"
 #include "tests/sim/model.hpp"
 
-// What administrators do to a hub, and what nodes may do how often: the reference model's part.
+// The reference model of administration, and of the rates at which nodes may ask.
 
 namespace gimnet::sim {
 

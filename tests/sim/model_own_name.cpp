@@ -3,7 +3,7 @@
 #include "proto/control/ns_watch.hpp"
 #include "tests/sim/model.hpp"
 
-// What a node asks of its own name, and of watching: the reference model's part.
+// The reference model of requests about a node's own name, and of watching.
 
 namespace gimnet::sim {
 

@@ -6,7 +6,7 @@
 #include "proto/control/ns_watch.hpp"
 #include "tests/sim/model.hpp"
 
-// What the answers to questions must say.
+// The answers that the reference model expects to questions.
 
 namespace gimnet::sim {
 
@@ -155,7 +155,7 @@ std::uint32_t last_of_page(const Answer& answer) {
   return answer.more ? index_of(answer.next) : UINT32_MAX;
 }
 
-/// How many records a page may have.
+/// The most records that a page may have.
 std::size_t page_size(const hub::Limits& limits, std::uint32_t wanted) {
   return std::clamp<std::size_t>(wanted, 1, limits.page_records);
 }

@@ -1,6 +1,6 @@
 #include "tests/sim/model.hpp"
 
-// Who finds a place on the hub, and who makes way: the reference model's part.
+// The reference model of places: the nodes that find one, and the nodes that make way.
 
 namespace gimnet::sim {
 

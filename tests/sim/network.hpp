@@ -13,7 +13,7 @@
 
 namespace gimnet::sim {
 
-/// Who may administer the hub, as the system tells it.
+/// The identity that may administer the hub, as the system tells it.
 inline constexpr hub::Identity kAdministrator = hub::Identity::of_user(0);
 
 using Bytes = std::vector<std::byte>;
@@ -33,14 +33,14 @@ struct Wire {
   Time next_at_node{};
   std::uint64_t session =
       0;  ///< that it was admitted for, as the reference model says; 0: not admitted
-  // Where its shard has it
+  // The shard's part
   bool attached = false;
   std::size_t shard = 0;
   std::uint32_t slot = 0;
 };
 using WirePointer = std::shared_ptr<Wire>;
 
-/// What the conductor and a shard hold of a wire.
+/// The end of a wire that the conductor or a shard holds.
 class WireStream final : public net::Stream {
  public:
   explicit WireStream(WirePointer wire) : wire_(std::move(wire)) {}
@@ -79,7 +79,7 @@ class Network {
   void close_by_hub(const WirePointer& wire);
 
  private:
-  /// How long a frame is under way; what the faults of the network add to that.
+  /// The time that a frame is under way, faults of the network included.
   [[nodiscard]] Time time_under_way();
   Setting& setting_;
   Ends ends_;

@@ -346,7 +346,8 @@ void SimNode::on_welcome(const WirePointer& wire, const proto::Welcome& welcome)
     // With a token it may be the same session under another id, with all that it had subscribed to.
     if (token_.empty()) forgot_ = false;
   }
-  // What was not declared on a connection between, of which the node knows nothing, may have ended.
+  // There may have been a connection between that the node knows nothing of. Subscriptions that
+  // were not declared on it may have ended.
   link().same_session = std::exchange(session_, wire->session) == wire->session && dials_ == 1;
   dials_ = 0;
   token_ = welcome.token;

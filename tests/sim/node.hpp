@@ -21,7 +21,7 @@ namespace gimnet::sim {
 /// checks what it is told. Thread safety: none. Errors: Broken.
 class SimNode {
  public:
-  /// What it needs of the world.
+  /// The parts of the world that it needs.
   struct Around {
     Setting& setting;
     Network& network;
@@ -54,7 +54,7 @@ class SimNode {
   [[nodiscard]] const std::map<std::string, Provided>& provides() const {
     return provides_;
   }  ///< by service
-  /// Where a service is.
+  /// The place of a service.
   struct Known {
     GroupId group;    ///< 0: none
     NodeId provider;  ///< 0: nobody
@@ -67,7 +67,7 @@ class SimNode {
   [[nodiscard]] const std::map<std::string, Subscribed>& subscribes() const {
     return subscribes_;
   }  ///< by full name
-  /// What it knows by watching; nullptr if it does not watch.
+  /// The view that it has by watching; nullptr if it does not watch.
   [[nodiscard]] const WatchView* view() const { return watches_ ? &view_ : nullptr; }
 
  private:
@@ -83,7 +83,7 @@ class SimNode {
   [[nodiscard]] static Open about(std::string subject, proto::ns::Advertise offer = {}) {
     return {{}, 0, std::move(subject), std::move(offer), {}, {}};
   }
-  /// What came of a group by one connection.
+  /// The messages of a group that came by one connection.
   struct Taken {
     std::optional<std::uint8_t> number;  ///< of the counts; nothing: none begun
     std::uint64_t messages = 0;
@@ -95,7 +95,7 @@ class SimNode {
     bool retained = false;
     bool credit_due = false;
   };
-  /// What belongs to one connection.
+  /// The state of one connection.
   struct Link {
     WirePointer wire;
     bool welcomed = false;

@@ -1,7 +1,7 @@
 #include "proto/control/ctrl.hpp"
 #include "tests/sim/node.hpp"
 
-// How a simulated node administers the hub, or tries to.
+// Administration of the hub by a simulated node, which may not have the right to.
 
 namespace gimnet::sim {
 

@@ -4,7 +4,7 @@
 #include "proto/frame/flow.hpp"
 #include "tests/sim/node.hpp"
 
-// How simulated nodes advertise and subscribe, count what they take, and credit it.
+// Simulated nodes advertise, subscribe, count the messages that they take, and credit them.
 
 namespace gimnet::sim {
 
@@ -52,7 +52,7 @@ void SimNode::draw_delivery(ns::Advertise& offer) {
   offer.window = counted ? window : 0;
   offer.retain = random.chance(plan.retain);
   const bool illegal = faulty() && random.chance(20);
-  // What takes data has no subscribers to pace.
+  // A service that accepts data has no subscribers to pace.
   if (offer.direction == ns::Direction::accepts && !illegal) {
     offer.delivery = ns::Delivery::stream;
     offer.window = 0;
@@ -131,8 +131,8 @@ void SimNode::on_service_moved(Link& from, std::span<const std::byte> payload) {
     know_window(from, event->name, *event, subscribed->second.wanted.number);
 }
 
-/// What an answer says of a service, an event said before: on this connection, or, where nothing
-/// changed, on the last.
+/// Requires that an event told the state of an answer before: on this connection, or on the last
+/// one if nothing changed.
 void SimNode::require_told(const Link& from, const std::string& full_name,
                            const Known& known) const {
   const auto before = from.before.find(full_name);
@@ -180,8 +180,8 @@ void SimNode::know_window(Link& link, const std::string& full_name, const ns::Se
     taken.window_most = 0;
     return;
   }
-  // Who asked for several may have had any of them in force since; 0 is what the provider offers,
-  // which may be the most.
+  // After several requests any of them may have been in force. 0 asks for the window that the
+  // provider offers, which may be the most.
   std::uint32_t most = state.window;
   const std::set<std::uint32_t>& asked = windows_asked_[full_name];
   if (asked.size() > 1) most = std::max(most, *asked.rbegin());

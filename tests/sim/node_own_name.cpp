@@ -3,7 +3,7 @@
 #include "proto/control/ns_watch.hpp"
 #include "tests/sim/node.hpp"
 
-// How a simulated node changes its own name, and watches everything.
+// A simulated node changes its own name, and watches everything.
 
 namespace gimnet::sim {
 

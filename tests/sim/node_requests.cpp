@@ -5,7 +5,7 @@
 #include "tests/sim/node.hpp"
 #include "tests/sim/shards.hpp"
 
-// What a simulated node asks and sends, and what it makes of what comes back.
+// Questions and frames that a simulated node sends, and its use of the answers.
 
 namespace gimnet::sim {
 

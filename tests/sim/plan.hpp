@@ -12,9 +12,9 @@
 
 namespace gimnet::sim {
 
-/// What a seed makes of a world: sizes, limits, and how likely each fault is, in thousandths of a
-/// node's acts; 0 switches a kind of fault off, which each seed does to some (swarm testing, Groce
-/// et al., ISSTA 2012).
+/// The world of a seed: sizes, limits, and the rate of each fault in thousandths of a node's acts.
+/// 0 switches a kind of fault off. Each seed switches some off (swarm testing, Groce et al., ISSTA
+/// 2012).
 struct Plan {
   std::size_t nodes = 0;
   std::size_t shards = 1;
@@ -59,7 +59,7 @@ struct Plan {
   [[nodiscard]] static Plan draw(Random& random, std::size_t nodes);
 };
 
-/// What can be taken out of a world, to see whether it breaks without that, too.
+/// A kind of fault that can be taken out of a world, to see whether it breaks without it, too.
 struct Fault {
   std::string_view name;
   std::uint64_t Plan::* likelihood;

@@ -11,7 +11,7 @@
 
 namespace gimnet::sim {
 
-/// What all parts of a world share. Thread safety: none. Lifetime: the world's.
+/// State that all parts of a world share. Thread safety: none. Lifetime: the world's.
 struct Setting {
   /// `without`: what is taken out of what the seed drew.
   Setting(const Random& source, std::size_t nodes, const Faults& without, bool print)

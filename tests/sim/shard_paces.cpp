@@ -3,8 +3,8 @@
 #include "proto/frame/flow.hpp"
 #include "tests/sim/shards.hpp"
 
-// How simulated shards pace subscriptions and keep last messages: what hub/data/fanout/pacer.cpp
-// and retained_messages.cpp do, for messages of one frame each.
+// Simulated shards pace subscriptions and keep last messages, as hub/data/fanout/pacer.cpp and
+// retained_messages.cpp do, for messages of one frame each.
 
 namespace gimnet::sim {
 

@@ -3,7 +3,7 @@
 #include "proto/frame/flow.hpp"
 #include "tests/sim/shards.hpp"
 
-// How simulated shards read their connections, and bring frames to others.
+// Simulated shards read their connections and bring frames to others.
 
 namespace gimnet::sim {
 
@@ -259,8 +259,8 @@ void SimShards::push(std::size_t index, Seat& seat, Data data) {
   }
 }
 
-/// What goes for what comes: an older LATEST message of the same stream, full or not, or the oldest
-/// of a service at a full queue. Returns their groups.
+/// Drops messages in favour of a newcomer: an older LATEST message of the same stream, also if the
+/// queue is not full, or the oldest one of a service at a full queue. Returns their groups.
 std::vector<GroupId> SimShards::make_room(Seat& seat, const proto::FrameHeader& header) {
   std::vector<GroupId> lost;
   if (header.kind != Kind::group) return lost;

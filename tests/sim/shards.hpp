@@ -21,7 +21,7 @@
 
 namespace gimnet::sim {
 
-/// Who may get a frame, by the reference model and not by the hub's tables.
+/// Tells the nodes that may get a frame, by the reference model and not by the hub's tables.
 class Witness {
  public:
   virtual ~Witness() = default;
@@ -65,7 +65,7 @@ class SimShards final : public hub::ShardProxy {
     ShardIndex shard;
     const hub::ShardCommand* command = nullptr;
   };
-  /// What was sent since forget_sent(). Valid until: time goes on.
+  /// The frames that were sent since forget_sent(). Valid until: time goes on.
   [[nodiscard]] const std::vector<Sent>& sent() const { return sent_; }
   void forget_sent() { sent_.clear(); }
 

@@ -46,7 +46,7 @@ bool leave_faults_out(Shrunk& best) {
 Shrunk shrink(const World::Options& world, const Report& report) {
   Shrunk best{world, report, 0};
   best.world.print = false;
-  // What helps is fewer nodes or fewer faults, of which there are so many: it ends.
+  // Each step takes nodes or faults away, so the loop ends.
   while (take_nodes_away(best) || leave_faults_out(best)) {
   }
   return best;

@@ -9,7 +9,7 @@
 
 namespace gimnet::sim {
 
-/// What a node knows of nodes and services by watching them, all or those that fit a pattern.
+/// The nodes and services that a node knows by watching, all or those that fit a pattern.
 /// Thread safety: none. Errors: Broken.
 class WatchView {
  public:

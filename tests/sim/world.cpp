@@ -124,11 +124,10 @@ void World::stop_hub() {
 
 void World::start_hub() {
   down_ = false;
-  // What is still on its way to the old life finds its wires closed; the old shards stay until
-  // then.
+  // Frames on their way to the old life find their wires closed. The old shards stay until then.
   dead_.push_back(std::move(life_));
   Past past = dead_.back()->model().past();
-  // Who was kicked while the disk was full is forgotten.
+  // A kick while the disk was full is forgotten.
   std::erase_if(past.kicked, [this](const Kicked& one) {
     return std::none_of(disk_.kicked.begin(), disk_.kicked.end(),
                         [&one](const hub::SessionToken& kept) {
@@ -347,7 +346,7 @@ void World::require_served(const SimNode& node) const {
                                    ", is not let in, and nothing stands in its way");
 }
 
-/// What the node believes of itself and its services is so.
+/// Requires that the node is right about itself and its services.
 void World::require_agreed(const SimNode& node) const {
   const Model& model = life_->model();
   const std::uint32_t index = index_of(node.id());

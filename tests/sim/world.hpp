@@ -11,7 +11,7 @@
 
 namespace gimnet::sim {
 
-/// How a world ended.
+/// The end of a world.
 struct Report {
   std::uint64_t seed = 0;
   std::uint64_t hash = 0;
@@ -43,7 +43,7 @@ class World {
 
  private:
   void begin_life(Past past);
-  /// What a hub kept before the world began.
+  /// The state that a hub kept before the world began.
   [[nodiscard]] Past make_disk();
   [[nodiscard]] std::string keep(const hub::HubState& state);
   void kill_hub();
@@ -54,8 +54,7 @@ class World {
   /// An administrator or a signal has the hub drain.
   void want_drain();
   void begin_drain();
-  /// What the conductor's loop does after events: begins to drain, or ends
-  /// (hub/control/conductor_loop.cpp).
+  /// Begins to drain, or ends, after events, as hub/control/conductor_loop.cpp does.
   void look_at_drain();
   void say_hello(const WirePointer& wire, const proto::Hello& hello, const hub::Identity& identity);
   void want_conductor(Time delay);

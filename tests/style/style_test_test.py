@@ -5,7 +5,6 @@ import tempfile
 import unittest
 from pathlib import Path
 
-import comments
 import rules
 from tree import Tree
 
@@ -284,14 +283,11 @@ CASES = {
         ],
     ),
     rules.comments_open_with_their_subject: (
-        [{"src/a.hpp": GUARDED + "/// The way home.\n/// What follows is more of it.\nint a;  ///< the one\n"},
-         {"src/a.hpp": GUARDED + "// What is old.\n", comments.OLD_COMMENTS_LIST: "src/a.hpp\n"}],
+        [{"src/a.hpp": GUARDED + "/// The way home.\n/// What follows is more of it.\nint a;  ///< the one\n"}],
         [
             {"src/a.hpp": GUARDED + "/// What comes.\n"},
             {"src/a.hpp": GUARDED + "/** How to. */\n"},
             {"src/a.hpp": GUARDED + "int a;  ///< Where it is\n"},
-            {"src/a.hpp": GUARDED + "int a;\n", comments.OLD_COMMENTS_LIST: "src/a.hpp\n"},
-            {comments.OLD_COMMENTS_LIST: "src/gone.hpp\n"},
         ],
     ),
     rules.links_resolve: (
