@@ -251,16 +251,6 @@ class Reload(Case):
         wait_until(lambda: hub.process.err.count("it is a pipe") == 2, "the refusals in the log")
         self.assertEqual(run_gimnet(hub, "pub", "robot/odom", data=b"x\n").code, 1, "the stricter policy rules still")
 
-    def test_a_configuration_from_a_pipe_is_not_lost_by_a_reload(self):
-        reading, writing = os.pipe()
-        os.write(writing, b"[limits]\nservices_per_node = 0\n")
-        os.close(writing)
-        # What a shell makes of <(...); the hub opens it anew.
-        with open(reading):
-            hub = self.hub("--config", f"/proc/{os.getpid()}/fd/{reading}")
-        self.assertEqual(self.ctl("reload").code, 1)
-        self.assertEqual(run_gimnet(hub, "pub", "robot/odom", data=b"x\n").code, 1, "the policy of the pipe rules")
-
     def test_without_descriptors_it_says_so_and_changes_nothing(self):
         hub = self.configured("[limits]\nservices_per_node = 10\n")
         more = self.file.parent / "conf.d"

@@ -209,7 +209,7 @@ std::string checked(const CommandLine& line) {
 }
 
 std::variant<CommandLine, CommandLineEnding> read_all(const CLI::App& app, CommandLine line) {
-  ReadConfiguration read = read_configuration(line.sources, true);
+  ReadConfiguration read = read_configuration(line.sources);
   if (!read.faults.empty()) {
     CommandLineEnding ending{2, {}};
     for (const ConfigFault& fault : read.faults) ending.text += fault.line() + "\n";
@@ -217,8 +217,7 @@ std::variant<CommandLine, CommandLineEnding> read_all(const CLI::App& app, Comma
   }
   // Read again it is the same file, or an error: a hub does not lose its configuration because a
   // file went.
-  line.sources.file = read.place.file;
-  line.sources.parts_alone = read.place.parts_alone;
+  line.sources.file = read.file;
   line.configuration = std::move(read.configuration);
   line.files = std::move(read.files);
   if (is_on(app, "--check-config")) return CommandLineEnding{0, checked(line)};

@@ -17,8 +17,7 @@ Reloading Reloader::read_again() {
   if (!reloading.faults.empty()) return reloading;
   // A file that appeared in a default place is the hub's from now on, and must not go unnoticed
   // when it goes.
-  sources_.file = read.place.file;
-  sources_.parts_alone = read.place.parts_alone;
+  sources_.file = read.file;
   const HubOptions& wanted = read.configuration.options;
   for (const Setting& setting : settings()) {
     std::string from = setting.show(in_force_);

@@ -23,73 +23,44 @@
 namespace gimnet::hub {
 namespace {
 
-constexpr const char* kGivePath =
-    "give the path of a TOML file with --config, or, in conf.d, take it away";
+namespace fs = std::filesystem;
+
+/// A whole file, or why it cannot be had.
+struct ConfigText {
+  std::string text;   ///< of a longer file kConfigBytesMax + 1 bytes
+  std::string error;  ///< what is wrong, and what to do
+};
 
 ConfigText no_text(int code) {
-  const char* remedy = kGivePath;
+  const char* remedy = "give the path of a TOML file with --config, or, in conf.d, take it away";
+  if (code == ENOENT) remedy = "make it, it may be empty; or give another one with --config";
   if (code == EACCES) remedy = "give the user that runs tcphub the right to read it";
   if (code == EMFILE) remedy = "raise the limit on descriptors (ulimit -n), or let a node go";
   return {{}, std::generic_category().message(code) + "; " + remedy};
 }
 
-/// The kind of thing that stands there instead of a file, or "".
-std::string instead_of_file(const struct stat& info, bool pipes) {
-  const std::string remedy = std::string{"; "} + kGivePath;
-  if (S_ISREG(info.st_mode)) return {};
-  if (S_ISFIFO(info.st_mode) && pipes) return {};
-  if (S_ISDIR(info.st_mode)) return "it is a folder" + remedy;
-  if (S_ISSOCK(info.st_mode)) return "it is a socket" + remedy;
-  if (S_ISFIFO(info.st_mode)) {
-    return "it is a pipe, which only a hub that starts can read, as the file of --config; put a "
-           "regular file in its "
-           "place";
-  }
-  // The usual word for "no file".
-  if (S_ISCHR(info.st_mode) && info.st_rdev == makedev(1, 3)) return {};
-  return "it is a device" + remedy;
-}
-
-/// Reads to the end, at most one byte more than a configuration may have. Returns an error or 0.
-int read_whole(int descriptor, std::string& text) {
-  while (text.size() <= kConfigBytesMax) {
-    const std::size_t before = text.size();
-    const std::size_t wanted = std::min<std::size_t>(kConfigBytesMax + 1 - before, 64 * 1024);
-    text.resize(before + wanted);
-    const ssize_t got = ::read(descriptor, text.data() + before, wanted);
-    text.resize(before + static_cast<std::size_t>(std::max<ssize_t>(got, 0)));
-    if (got == 0) return 0;
-    if (got < 0 && errno != EINTR) return errno;
-  }
-  return 0;
-}
-
-}  // namespace
-
-ConfigText read_config_text(const std::string& path, bool pipes) {
+/// Reads a regular file, and /dev/null as an empty one. All else is an error and is not waited for.
+ConfigText read_config_text(const std::string& path) {
+  const Descriptor file(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC));
   struct stat info{};
-  // Before it is opened: opening may already do something to a device, or wake the writer of a
-  // pipe.
-  if (::stat(path.c_str(), &info) != 0) return no_text(errno);
-  if (std::string error = instead_of_file(info, pipes); !error.empty())
-    return {{}, std::move(error)};
-  const int waits = S_ISFIFO(info.st_mode) ? 0 : O_NONBLOCK;
-  const Descriptor file(::open(path.c_str(), O_RDONLY | waits | O_NOCTTY | O_CLOEXEC));
   if (file.get() < 0 || ::fstat(file.get(), &info) != 0) return no_text(errno);
-  // Something else may have taken its place.
-  if (std::string error = instead_of_file(info, pipes); !error.empty())
-    return {{}, std::move(error)};
+  if (S_ISDIR(info.st_mode)) return no_text(EISDIR);
+  const bool null = S_ISCHR(info.st_mode) && info.st_rdev == makedev(1, 3);
+  if (!S_ISREG(info.st_mode) && !null)
+    return {{}, "it is a pipe or a device; put a regular file in its place"};
   ConfigText whole;
-  if (const int error = read_whole(file.get(), whole.text); error != 0) return no_text(error);
-  if (whole.text.empty() && S_ISFIFO(info.st_mode)) {
-    return {{}, "this pipe is empty; did the command behind it fail?"};
+  // One byte more than a configuration may have shows that it is too long.
+  while (whole.text.size() <= kConfigBytesMax) {
+    const std::size_t before = whole.text.size();
+    const std::size_t wanted = std::min<std::size_t>(kConfigBytesMax + 1 - before, 64 * 1024);
+    whole.text.resize(before + wanted);
+    const ssize_t got = ::read(file.get(), whole.text.data() + before, wanted);
+    if (got < 0 && errno != EINTR) return no_text(errno);
+    whole.text.resize(before + static_cast<std::size_t>(std::max<ssize_t>(got, 0)));
+    if (got == 0) break;
   }
   return whole;
 }
-
-namespace {
-
-namespace fs = std::filesystem;
 
 constexpr std::string_view kPrefix = "TCPHUB_";
 constexpr std::string_view kLimitsPrefix = "TCPHUB_LIMITS_";
@@ -152,8 +123,8 @@ Given from_environment(const std::string& variable, const std::string& key, std:
   return given;
 }
 
-void read_one(const std::string& path, bool pipes, ReadConfiguration& read) {
-  const ConfigText file = read_config_text(path, pipes);
+void read_one(const std::string& path, ReadConfiguration& read) {
+  const ConfigText file = read_config_text(path);
   read.files.push_back(path);
   if (!file.error.empty()) {
     read.faults.push_back({path, "cannot read this file: " + file.error});
@@ -195,19 +166,12 @@ std::vector<std::string> files_in(const fs::path& folder, Faults& faults) {
   return files;
 }
 
-std::vector<std::string> parts_beside(const ConfigPlace& place, Faults& faults) {
-  return files_in(fs::path{place.file}.parent_path() / "conf.d", faults);
-}
-
-/// The first of the default places where there is a file, or parts of one.
-ConfigPlace default_place() {
+/// The first of the default places where there is a file, or a conf.d that wants one; "": none.
+std::string default_place() {
   std::error_code ignored;
   for (const std::string& file : default_config_files()) {
-    if (fs::exists(file, ignored)) return {file, false};
-    if (!fs::is_directory(fs::path{file}.parent_path() / "conf.d", ignored)) continue;
-    ConfigPlace parts{file, true};
-    Faults faults;
-    if (!parts_beside(parts, faults).empty() || !faults.empty()) return parts;
+    const fs::path parts = fs::path{file}.parent_path() / "conf.d";
+    if (fs::exists(file, ignored) || fs::is_directory(parts, ignored)) return file;
   }
   return {};
 }
@@ -254,25 +218,17 @@ std::vector<std::string> read_environment(ConfigSources& sources, const char* co
   return warnings;
 }
 
-ReadConfiguration read_configuration(const ConfigSources& sources, bool pipes) {
+ReadConfiguration read_configuration(const ConfigSources& sources) {
   ReadConfiguration read;
   read.faults = sources.faults;
   read.configuration.options.shards = default_shards();
   read.configuration.proxy = sources.proxy;
-  read.place =
-      sources.file.empty() ? default_place() : ConfigPlace{sources.file, sources.parts_alone};
-  if (!read.place.file.empty()) {
-    Faults of_folder;
-    const std::vector<std::string> parts = parts_beside(read.place, of_folder);
-    std::error_code ignored;
-    // A hub that started with parts alone needs no file as long as there are any parts. So it does
-    // not lose its configuration unnoticed.
-    const bool any_parts = !parts.empty() || !of_folder.empty();
-    read.place.parts_alone =
-        read.place.parts_alone && any_parts && !fs::exists(read.place.file, ignored);
-    if (!read.place.parts_alone) read_one(read.place.file, pipes, read);
-    read.faults.insert(read.faults.end(), of_folder.begin(), of_folder.end());
-    for (const std::string& part : parts) read_one(part, false, read);
+  read.file = sources.file.empty() ? default_place() : sources.file;
+  if (!read.file.empty()) {
+    read_one(read.file, read);
+    for (const std::string& part :
+         files_in(fs::path{read.file}.parent_path() / "conf.d", read.faults))
+      read_one(part, read);
   }
   for (const Given& given : sources.environment) apply(read.configuration, given, read.faults);
   for (const Given& given : sources.flags) apply(read.configuration, given, read.faults);

@@ -101,25 +101,6 @@ TEST_F(ReloaderTest, WhatIsNoRegularFileIsAFaultAndNothingIsWaitedFor) {
   EXPECT_THAT(reloader.read_again().changes, SizeIs(1)) << "a file again";
 }
 
-TEST_F(ReloaderTest, PartsThatWereEnoughMustNotGoUnnoticed) {
-  std::filesystem::remove(path_);
-  const std::string parts = folder_.path("conf.d");
-  const std::string part = parts + "/a.toml";
-  std::filesystem::create_directory(parts);
-  std::ofstream(part) << "[limits]\nnodes = 10\n";
-  sources_.parts_alone = true;
-  Reloader reloader = started();
-  EXPECT_THAT(reloader.read_again().changes, IsEmpty());
-  std::filesystem::remove(part);
-  EXPECT_THAT(reloader.read_again().faults, SizeIs(1));
-  std::ofstream(part) << "[limits]\nnodes = 20\n";
-  EXPECT_THAT(reloader.read_again().changes, SizeIs(1));
-  write("[limits]\nservices_per_node = 3\n");
-  EXPECT_THAT(reloader.read_again().changes, SizeIs(1));
-  std::filesystem::remove(path_);
-  EXPECT_THAT(reloader.read_again().faults, SizeIs(1)) << "from now on it is needed";
-}
-
 TEST_F(ReloaderTest, ALevelThatWasSetByRequestIsSetBack) {
   Reloader reloader = started();
   reloader.note_log_level(LogLevel::debug);

@@ -1,17 +1,15 @@
 #include "hub/config/sources.hpp"
 
-#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/ioctl.h>
 #include <sys/resource.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/un.h>
 #include <unistd.h>
 
-#include <chrono>
 #include <cstdlib>
 #include <fstream>
-#include <thread>
 
 #include "hub/config/toml_file.hpp"
 #include "tests/hub/control/support/folder.hpp"
@@ -167,7 +165,7 @@ TEST_F(SourcesTest, AFileThatIsNamedHasToBeThere) {
   EXPECT_THAT(read().faults[0].line(),
               HasSubstr("hub.toml: cannot read this file: No such file or directory"));
   ASSERT_EQ(::mkdir(folder_.path("hub.toml").c_str(), 0700), 0);
-  EXPECT_THAT(read().faults[0].line(), HasSubstr("it is a folder"));
+  EXPECT_THAT(read().faults[0].line(), HasSubstr("Is a directory; give the path"));
 }
 
 TEST_F(SourcesTest, AFileInThePlaceOfTheFolderIsTold) {
@@ -211,24 +209,18 @@ TEST_F(SourcesTest, TheUsersFileIsFoundAndNoneIsNeeded) {
   ::unsetenv("XDG_CONFIG_HOME");
 }
 
-TEST_F(SourcesTest, PartsInADefaultPlaceNeedNoFile) {
+TEST_F(SourcesTest, PartsInADefaultPlaceWantAFileBesideThem) {
   sources_.file.clear();
   ::setenv("XDG_CONFIG_HOME", folder_.path("").c_str(), 1);
   ASSERT_EQ(::mkdir(folder_.path("gimnet").c_str(), 0700), 0);
   ASSERT_EQ(::mkdir(folder_.path("gimnet/conf.d").c_str(), 0700), 0);
-  EXPECT_THAT(read().faults, IsEmpty());
-  EXPECT_FALSE(read().place.parts_alone) << "there are no parts yet";
   write("gimnet/conf.d/a.toml", "hub_id = 77\n");
-  const ReadConfiguration parts = read();
-  EXPECT_THAT(parts.faults, IsEmpty());
-  EXPECT_EQ(parts.configuration.options.id, HubId{77});
-  EXPECT_THAT(parts.files, ElementsAre(folder_.path("/gimnet/conf.d/a.toml")));
-  EXPECT_EQ(parts.place.file, folder_.path("/gimnet/tcphub.toml"));
-  EXPECT_TRUE(parts.place.parts_alone);
-  write("gimnet/tcphub.toml", "hub_id = 9\nshards = 3\n");
-  EXPECT_EQ(read().configuration.options.shards, 3u);
+  ASSERT_THAT(read().faults, SizeIs(1)) << "the parts are not left out unnoticed";
+  EXPECT_THAT(read().faults[0].line(), HasSubstr("tcphub.toml: cannot read this file: No such file "
+                                                 "or directory; make it, it may be empty"));
+  write("gimnet/tcphub.toml", "");
   EXPECT_EQ(read().configuration.options.id, HubId{77});
-  EXPECT_FALSE(read().place.parts_alone);
+  EXPECT_EQ(read().file, folder_.path("/gimnet/tcphub.toml"));
   ::unsetenv("XDG_CONFIG_HOME");
 }
 
@@ -244,28 +236,33 @@ TEST_F(SourcesTest, HiddenFilesAreNoParts) {
   EXPECT_THAT(read().faults, SizeIs(1)) << "who is not hidden must be there";
 }
 
-TEST_F(SourcesTest, APipeIsReadAtTheStartAndNeverInPlaceOfAPart) {
-  ASSERT_EQ(::mkfifo(folder_.path("hub.toml").c_str(), 0600), 0);
-  EXPECT_THAT(read().faults, SizeIs(1));
-  const int writer = ::open(folder_.path("hub.toml").c_str(), O_RDWR);
-  ASSERT_GE(writer, 0);
-  ASSERT_EQ(::write(writer, "hub_id = 9\n", 11), 11);
-  ReadConfiguration started;
-  std::thread reader([&] { started = read_configuration(sources_, true); });
-  int queued = 1;
-  while (queued != 0) ASSERT_EQ(::ioctl(writer, FIONREAD, &queued), 0);
-  ::close(writer);
-  reader.join();
-  EXPECT_THAT(started.faults, IsEmpty());
-  EXPECT_EQ(started.configuration.options.id, HubId{9});
-  ASSERT_EQ(::unlink(folder_.path("hub.toml").c_str()), 0);
-  write("hub.toml", "");
-  make_conf_d();
-  ASSERT_EQ(::mkfifo(folder_.path("conf.d/a.toml").c_str(), 0600), 0);
-  const ReadConfiguration part = read_configuration(sources_, true);
-  ASSERT_THAT(part.faults, SizeIs(1));
-  EXPECT_THAT(part.faults[0].line(),
-              HasSubstr("conf.d/a.toml: cannot read this file: it is a pipe"));
+TEST_F(SourcesTest, OnlyARegularFileIsRead) {
+  const auto fault_of = [this](const std::string& path) {
+    sources_.file = path;
+    const Faults faults = read().faults;
+    return faults.empty() ? "" : faults.front().sentence;
+  };
+  EXPECT_EQ(fault_of("/dev/null"), "") << "the usual word for no file";
+  ASSERT_EQ(::mkfifo(folder_.path("pipe").c_str(), 0600), 0);
+  for (const std::string& path : {folder_.path("pipe"), std::string{"/dev/zero"}})
+    EXPECT_EQ(fault_of(path),
+              "cannot read this file: it is a pipe or a device; put a regular file in its place");
+  const int socket = ::socket(AF_UNIX, SOCK_STREAM, 0);
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  const std::string path = folder_.path("socket");
+  path.copy(address.sun_path, sizeof address.sun_path - 1);
+  ASSERT_EQ(::bind(socket, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  EXPECT_THAT(fault_of(path), HasSubstr("; give the path of a TOML file"));
+  ::close(socket);
+}
+
+TEST_F(SourcesTest, AFileThatIsTooLongIsTold) {
+  write("hub.toml", std::string(kConfigBytesMax, '#'));
+  EXPECT_THAT(read().faults, IsEmpty());
+  write("hub.toml", std::string(3 * kConfigBytesMax, '#'));
+  ASSERT_THAT(read().faults, SizeIs(1));
+  EXPECT_THAT(read().faults[0].line(), HasSubstr("the file is over 1048576 bytes"));
 }
 
 TEST_F(SourcesTest, FaultsComeInTheOrderOfTheFile) {
