@@ -34,40 +34,20 @@ std::string remedy_of_folder(int error, const std::string& path, const std::stri
   return "; " + elsewhere;
 }
 
-/// Root makes a folder in another user's folder: it becomes that user's.
-void give_to_user_above(const std::string& path) {
-  struct stat above{};
-  const Descriptor folder(::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC));
-  if (::geteuid() != 0 || ::fstatat(folder.get(), "..", &above, 0) != 0 || above.st_uid == 0)
-    return;
-  // If the system refuses, the folder stays root's, which can use it.
-  static_cast<void>(!::fchown(folder.get(), above.st_uid, above.st_gid));
-}
-
 /// "" when there is something at `path` then; `info` describes it.
 std::string make_folder(const std::string& path, struct stat& info,
                         const char* elsewhere = kElsewhere) {
-  const bool made = ::mkdir(path.c_str(), kPrivateFolder) == 0;
-  if (!made && errno != EEXIST) {
+  if (::mkdir(path.c_str(), kPrivateFolder) != 0 && errno != EEXIST) {
     const int error = errno;
     return "cannot create the folder " + path + ": " + system_text(error) +
            remedy_of_folder(error, path, elsewhere);
   }
-  if (made) give_to_user_above(path);
   if (::lstat(path.c_str(), &info) != 0) {
     const int error = errno;
     return "cannot use the folder " + path + ": " + system_text(error) +
            remedy_of_folder(error, path, elsewhere);
   }
   return {};
-}
-
-/// The fault of a link at `path` whose target cannot be looked at.
-std::string broken_link(const std::string& path, int error) {
-  const std::string what = error == ENOENT
-                               ? "it is a link to something that does not exist; make that folder"
-                               : "it is a link, and " + system_text(error) + "; remove it";
-  return "cannot use the folder " + path + ": " + what + ", or " + kStateElsewhere;
 }
 
 }  // namespace
@@ -106,13 +86,15 @@ std::vector<std::string> default_addresses() {
 std::string prepare_state_folder(const std::string& path) {
   struct stat info{};
   if (std::string error = make_folder(path, info, kStateElsewhere); !error.empty()) return error;
-  if (S_ISLNK(info.st_mode) && ::stat(path.c_str(), &info) != 0) return broken_link(path, errno);
+  if (S_ISLNK(info.st_mode) && ::stat(path.c_str(), &info) != 0) {
+    return "cannot use the folder " + path + ": it is a link, and " + system_text(errno) +
+           "; remove it, or " + kStateElsewhere;
+  }
   if (!S_ISDIR(info.st_mode)) {
     return "cannot use " + path + " for state: it is not a folder; remove it, or " +
            kStateElsewhere;
   }
-  // Root acts for whoever has the folder, and gives that user the files.
-  if (info.st_uid != ::geteuid() && info.st_uid != 0 && ::geteuid() != 0) {
+  if (info.st_uid != ::geteuid()) {
     return "cannot use the folder " + path +
            " for state: it belongs to another user, who could put other files into it; run tcphub "
            "as that user, or " +
@@ -139,16 +121,17 @@ Result<std::string> default_state_folder(const std::string& name) {
   path = path.substr(0, path.find(':'));
   if (!path.empty()) return path + "/" + name;
   path = absolute("XDG_STATE_HOME");
+  std::vector<const char*> parts{"", "/gimnet"};
   if (path.empty()) {
     path = absolute("HOME");
-    if (path.empty()) return Error{"neither XDG_STATE_HOME nor HOME is set"};
-    path += "/.local";
-    struct stat info{};
-    if (std::string error = make_folder(path, info); !error.empty()) return Error{std::move(error)};
-    path += "/state";
+    parts = {"/.local", "/state", "/gimnet"};
   }
-  for (const char* part : {"", "/gimnet"}) {
-    struct stat info{};
+  if (path.empty()) return Error{"neither XDG_STATE_HOME nor HOME is set"};
+  struct stat info{};
+  // Folders that root creates in the home of a user are of no use to that user.
+  if (::geteuid() == 0 && ::stat(path.c_str(), &info) == 0 && info.st_uid != 0)
+    return Error{path + " belongs to another user"};
+  for (const char* part : parts) {
     path += part;
     if (std::string error = make_folder(path, info); !error.empty()) return Error{std::move(error)};
   }

@@ -20,12 +20,12 @@ namespace gimnet::hub {
 [[nodiscard]] std::vector<std::string> default_addresses();
 
 /// The folder for what a hub keeps, created with mode 0700. "" or why it cannot be used: it is no
-/// folder, others may write to it, or this user may not. Root may use any user's.
+/// folder, belongs to another user, others may write to it, or this user may not.
 [[nodiscard]] std::string prepare_state_folder(const std::string& path);
 
 /// The default place of the state of the hub of that name: `name` in STATE_DIRECTORY (systemd),
 /// else in gimnet in XDG_STATE_HOME, else in ~/.local/state/gimnet. The folders above it are
-/// created. Errors: why there is no such place.
+/// created. Errors: why there is no such place; root takes none in the home of another user.
 [[nodiscard]] Result<std::string> default_state_folder(const std::string& name);
 
 }  // namespace gimnet::hub

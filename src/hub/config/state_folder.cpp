@@ -41,12 +41,12 @@ std::string open_fault(int error, const std::string& otherwise) {
   return system_text(error) + (error == EACCES ? kOtherFolder : otherwise);
 }
 
-/// "" for a regular file of that user into which nobody else may look, or why it is none.
-std::string private_file_fault(int descriptor, const std::string& path, uid_t user) {
+/// "" for a regular file of this user into which nobody else may look, or why it is none.
+std::string private_file_fault(int descriptor, const std::string& path) {
   struct stat info{};
   if (::fstat(descriptor, &info) != 0) return system_text(errno);
   if (!S_ISREG(info.st_mode)) return "it is not a file; remove it";
-  if (info.st_uid != user)
+  if (info.st_uid != ::geteuid())
     return "it belongs to another user; run tcphub as that user, or give it --state-dir";
   if ((info.st_mode & 0077) != 0) return "other users have rights in it; chmod 600 " + path;
   return {};
@@ -121,10 +121,10 @@ Result<std::unique_ptr<StateFolder>> StateFolder::open(const std::string& path) 
     return Error{"cannot use the folder " + path +
                  " for state: " + open_fault(errno, kOtherFolder)};
   const std::string name = path + "/" + kLock;
-  const Owner owner = owner_in(folder.get());
-  Descriptor lock(open_lock(folder.get(), owner));
+  Descriptor lock(
+      ::openat(folder.get(), kLock, O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, kPrivateFile));
   if (!lock.is_open()) return Error{"cannot use " + name + ": " + open_fault(errno, kOtherFolder)};
-  if (const std::string fault = private_file_fault(lock.get(), name, owner.user); !fault.empty()) {
+  if (const std::string fault = private_file_fault(lock.get(), name); !fault.empty()) {
     return Error{"cannot use " + name + ": " + fault};
   }
   if (::flock(lock.get(), LOCK_EX | LOCK_NB) != 0) {
@@ -132,44 +132,19 @@ Result<std::unique_ptr<StateFolder>> StateFolder::open(const std::string& path) 
     return Error{"cannot lock " + name + ": " + system_text(errno) +
                  "; give tcphub a folder on a disk of this machine with --state-dir"};
   }
-  // A hub that kept nothing takes the file away: what was opened before then is no file of the
-  // folder any more.
+  // A hub that kept something left its number in the file.
   struct stat info{};
-  if (::fstat(lock.get(), &info) == 0 && info.st_nlink == 0) return open(path);
-  // Not before it is locked: the file may be of a hub that just takes it away, or that could not
-  // lock it. Who had it wrote its number.
+  static_cast<void>(::fstat(lock.get(), &info));
   const bool was_used =
       info.st_size > 0 || ::faccessat(folder.get(), kState, F_OK, AT_SYMLINK_NOFOLLOW) == 0;
   write_holder(lock.get());
   return std::unique_ptr<StateFolder>(
-      new StateFolder(path, owner, folder.release(), lock.release(), was_used));
-}
-
-StateFolder::Owner StateFolder::owner_in(int folder) {
-  struct stat info{};
-  if (::geteuid() != 0 || ::fstat(folder, &info) != 0) return {::geteuid(), ::getegid()};
-  return {info.st_uid, info.st_gid};
-}
-
-bool StateFolder::give(int file, const Owner& owner) {
-  return owner.user == ::geteuid() || ::fchown(file, owner.user, owner.group) == 0;
-}
-
-int StateFolder::open_lock(int folder, const Owner& owner) {
-  constexpr int kHow = O_RDWR | O_NOFOLLOW | O_CLOEXEC;
-  for (;;) {
-    // Only a file that was created here is given away.
-    Descriptor created(::openat(folder, kLock, kHow | O_CREAT | O_EXCL, kPrivateFile));
-    if (created.is_open()) return give(created.get(), owner) ? created.release() : -1;
-    if (errno != EEXIST) return -1;
-    const int found = ::openat(folder, kLock, kHow);
-    if (found >= 0 || errno != ENOENT) return found;  // else a hub that kept nothing took it away
-  }
+      new StateFolder(path, folder.release(), lock.release(), was_used));
 }
 
 StateFolder::~StateFolder() {
-  // No hub was here: the next one is not to believe that what a hub kept is lost.
-  if (!was_used_ && !kept_) static_cast<void>(::unlinkat(folder_, kLock, 0));
+  // No hub was here: the next one must not believe that what a hub kept is lost.
+  if (!was_used_ && !kept_) static_cast<void>(!::ftruncate(lock_, 0));
   ::close(lock_);
   ::close(folder_);
 }
@@ -181,7 +156,7 @@ Result<std::optional<HubState>> StateFolder::read() const {
     if (errno == ENOENT) return std::optional<HubState>{};
     return Error{"cannot read " + name + ": " + open_fault(errno, kBeginAnew)};
   }
-  if (const std::string fault = private_file_fault(file.get(), name, owner_.user); !fault.empty()) {
+  if (const std::string fault = private_file_fault(file.get(), name); !fault.empty()) {
     return Error{"cannot use " + name + ": " + fault};
   }
   int error = 0;
@@ -211,7 +186,6 @@ std::string StateFolder::write(const HubState& state) {
       folder_, kFresh, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, kPrivateFile));
   if (!file.is_open()) return failed("create");
   created = true;
-  if (!give(file.get(), owner_)) return failed("chown");
   if (!write_all(file.get(), write_hub_state(state))) return failed("write");
   if (::fsync(file.get()) != 0) return failed("fsync");
   if (::renameat(folder_, kFresh, folder_, kState) != 0) return failed("rename");

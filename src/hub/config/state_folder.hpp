@@ -1,7 +1,5 @@
 #pragma once
 
-#include <sys/types.h>
-
 #include <chrono>
 #include <functional>
 #include <memory>
@@ -18,10 +16,8 @@ namespace gimnet::hub {
 
 /// The folder in which one hub keeps its state: a file `state`, and a file `lock` that keeps a
 /// second hub out while this one lives. What stands there is not trusted: it is read within bounds,
-/// links are not followed. A folder that no hub used before, that was opened and into which nothing
-/// was kept is left empty. Where the lock cannot be had its file stays: to remove it without
-/// holding it could take it from another hub. In a folder of another user, which root alone may
-/// use, the files are that user's, so that both can go on from them. Thread safety: none.
+/// links are not followed. The folder and its files belong to the user that runs the hub. A hub
+/// that kept nothing leaves an empty `lock`, which is no sign of a hub. Thread safety: none.
 /// Ownership: of two descriptors. Errors: sentences that name the file and say what to do.
 class StateFolder {
  public:
@@ -42,21 +38,10 @@ class StateFolder {
   [[nodiscard]] bool was_used() const { return was_used_; }
 
  private:
-  struct Owner {
-    uid_t user{};
-    gid_t group{};
-  };
-  StateFolder(std::string path, const Owner& owner, int folder, int lock, bool was_used)
-      : path_(std::move(path)), owner_(owner), folder_(folder), lock_(lock), was_used_(was_used) {}
-  /// Whose the files of that folder are.
-  [[nodiscard]] static Owner owner_in(int folder);
-  /// Makes a file that this process created the owner's. False: errno says why not.
-  [[nodiscard]] static bool give(int file, const Owner& owner);
-  /// Opens the lock file, creates it if there is none. Below 0: errno says why not.
-  [[nodiscard]] static int open_lock(int folder, const Owner& owner);
+  StateFolder(std::string path, int folder, int lock, bool was_used)
+      : path_(std::move(path)), folder_(folder), lock_(lock), was_used_(was_used) {}
 
   const std::string path_;
-  const Owner owner_;
   const int folder_;
   const int lock_;
   const bool was_used_;
