@@ -8,7 +8,7 @@
 #include "hub/control/listener.hpp"
 #include "hub/limits.hpp"
 #include "hub/observe/refusal_counters.hpp"
-#include "hub/shard/control_inbox.hpp"
+#include "hub/shard/commands.hpp"
 
 namespace gimnet::hub {
 

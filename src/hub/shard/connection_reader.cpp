@@ -5,11 +5,28 @@
 #include <utility>
 
 #include "hub/shard/flow_words.hpp"
-#include "hub/shard/repeated_receive.hpp"
 #include "proto/frame/extensions.hpp"
 #include "proto/frame/frame_parser.hpp"
 
 namespace gimnet::hub {
+
+std::size_t receive_more(Connection& connection, std::span<std::byte> room, Tally& tally) {
+  std::size_t bytes = 0;
+  for (int reads = 0; reads < kReadsMore && bytes < std::min(kSmallReadBytes, room.size());
+       ++reads) {
+    const net::IoResult more = connection.transport->receive(room.subspan(bytes));
+    ++tally.receive_calls;
+    if (more.status != net::IoStatus::ok) break;
+    bytes += more.bytes;
+  }
+  if (bytes != 0) {
+    connection.read_again.succeeded();
+  } else {
+    connection.read_again.failed();
+  }
+  return bytes;
+}
+
 namespace {
 
 /// A newcomer's destinations show only when it is read: so much of it is read, even if some shard

@@ -19,8 +19,8 @@
 #include "hub/limits.hpp"
 #include "hub/observe/counters.hpp"
 #include "hub/observe/session_gauges.hpp"
+#include "hub/shard/commands.hpp"
 #include "hub/shard/connection.hpp"
-#include "hub/shard/control_inbox.hpp"
 #include "hub/shard/poller.hpp"
 #include "hub/shard/signals.hpp"
 

@@ -10,10 +10,9 @@
 #include "hub/data/egress/egress_context.hpp"
 #include "hub/data/egress/lane_queue.hpp"
 #include "hub/data/egress/open_messages.hpp"
-#include "hub/data/egress/open_run.hpp"
 #include "hub/data/egress/pause_book.hpp"
 #include "hub/data/egress/resume_buffer.hpp"
-#include "hub/data/egress/run_queue.hpp"
+#include "hub/data/egress/run.hpp"
 #include "hub/observe/session_gauges.hpp"
 #include "proto/frame/flow.hpp"
 

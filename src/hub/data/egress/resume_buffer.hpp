@@ -6,7 +6,7 @@
 
 #include "hub/data/egress/counted_groups.hpp"
 #include "hub/data/egress/entry.hpp"
-#include "hub/data/egress/run_queue.hpp"
+#include "hub/data/egress/run.hpp"
 #include "hub/data/ring_queue.hpp"
 
 namespace gimnet::hub {

@@ -7,7 +7,7 @@
 #include "base/check.hpp"
 #include "base/ids.hpp"
 #include "hub/data/egress/outbox.hpp"
-#include "hub/data/fanout/paced_book.hpp"
+#include "hub/data/fanout/paced_subscription.hpp"
 
 namespace gimnet::hub {
 

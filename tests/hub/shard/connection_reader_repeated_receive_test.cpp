@@ -1,4 +1,4 @@
-#include "hub/shard/repeated_receive.hpp"
+#include "hub/shard/connection_reader.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

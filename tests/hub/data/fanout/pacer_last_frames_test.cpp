@@ -1,4 +1,4 @@
-#include "hub/data/fanout/last_frames.hpp"
+#include "hub/data/fanout/pacer.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "hub/data/fanout/shard_recipients.hpp"
+#include "hub/data/fanout/fanout.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

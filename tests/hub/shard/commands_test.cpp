@@ -1,4 +1,4 @@
-#include "hub/shard/control_inbox.hpp"
+#include "hub/shard/commands.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "hub/data/egress/open_run.hpp"
+#include "hub/data/egress/copy_chunk.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "hub/shard/allocation_meter.hpp"
+#include "hub/shard/io_shard.hpp"
 
 #include <gtest/gtest.h>
 
