@@ -223,20 +223,12 @@ void Outbound::send_last_again(const std::string& service) {
 
 void Outbound::begin_declaring() {
   const MutexLock lock(mutex_);
-  declaring_ = true;
+  moves_.begin();
 }
 
 std::uint64_t Outbound::readdress(const SendQueue::GroupMap& moves) {
   const Inside inside(*this);
-  for (auto& [former, now] : moves_) {
-    if (const auto moved = moves.find(now); now != 0 && moved != moves.end()) now = moved->second;
-  }
-  for (const auto& [former, now] : moves) {
-    if (former != now) moves_[former] = now;
-  }
-  for (const auto& [former, now] : moves) {
-    if (now != 0) moves_.erase(now);
-  }
+  moves_.add(moves);
   const std::uint64_t lost = queue_.held_back() ? queue_.go_on(moves) : 0;
   lost_ |= lost > 0;
   return lost;
@@ -244,26 +236,14 @@ std::uint64_t Outbound::readdress(const SendQueue::GroupMap& moves) {
 
 void Outbound::end_declaring() {
   const MutexLock lock(mutex_);
-  declaring_ = false;
+  moves_.end();
   notify_waiting();
   write_or_leave(false);
 }
 
 void Outbound::forget_moves(std::uint32_t group) {
   const MutexLock lock(mutex_);
-  moves_.erase(group);
-  std::erase_if(moves_, [group](const auto& entry) { return entry.second == group; });
-}
-
-void Outbound::redirect(Outgoing& message) const {
-  if (moves_.empty() || !message.is_group()) return;
-  const auto moved = moves_.find(message.parts().header.dst);
-  if (moved != moves_.end() && moved->second != 0) message.redirect(moved->second);
-}
-
-bool Outbound::refuses(std::uint32_t group) const {
-  const auto moved = moves_.find(group);
-  return group == 0 || (moved != moves_.end() && moved->second == 0);
+  moves_.forget(group);
 }
 
 std::uint32_t Outbound::waiting() {

@@ -4,19 +4,19 @@
 #include <cstddef>
 #include <cstdint>
 #include <exception>
-#include <map>
 #include <optional>
 #include <span>
 #include <string>
 #include <unordered_map>
 #include <vector>
 
-#include "base/ids.hpp"
 #include "base/mutex.hpp"
 #include "client/nif/error.hpp"
+#include "client/nif/group_moves.hpp"
 #include "client/nif/held_messages.hpp"
 #include "client/nif/last_messages.hpp"
 #include "client/nif/outgoing.hpp"
+#include "client/nif/pause_table.hpp"
 #include "client/nif/reported_messages.hpp"
 #include "client/nif/send_queue.hpp"
 #include "client/nif/session_terms.hpp"
@@ -28,48 +28,6 @@
 #include "proto/frame/window.hpp"
 
 namespace gimnet::nif {
-
-/// Kind, lane and destination: what PAUSE is about, and what keeps its order.
-[[nodiscard]] constexpr std::uint64_t stream_code(proto::Kind kind, std::uint8_t lane,
-                                                  std::uint32_t dst) {
-  return (static_cast<std::uint64_t>(kind) << 40) | (static_cast<std::uint64_t>(lane) << 32) | dst;
-}
-
-/// The destinations that a hub has paused. In order, which no choice of destinations can make slow.
-/// Thread safety: guarded by its owner. Time is an argument.
-class PauseTable {
- public:
-  /// A hub that pauses more than this is not obeyed further.
-  static constexpr std::size_t kPausesMax = 65'536;
-  /// A pause about another hub holds for so long, unless it is said again: its RESUME may be lost
-  /// with a link (docs/protocol.md, section 10).
-  static constexpr std::int64_t kRemoteNs = 1'000'000'000;
-
-  void pause(const proto::flow::Target& target, std::int64_t now_ns) {
-    if (paused_.size() < kPausesMax || paused_.contains(code(target)))
-      paused_[code(target)] = now_ns;
-  }
-  /// Lifts those about other hubs than `own` whose time is over. True: there were some.
-  bool lift_overdue(HubId own, std::int64_t now_ns) {
-    return std::erase_if(paused_, [&](const auto& each) {
-             const NodeId dst{static_cast<std::uint32_t>(each.first)};
-             return hub_of(dst) != own && now_ns - each.second >= kRemoteNs;
-           }) != 0;
-  }
-  void resume(const proto::flow::Target& target) { paused_.erase(code(target)); }
-  [[nodiscard]] bool is_paused(std::uint64_t stream) const {
-    return !paused_.empty() && paused_.contains(stream);
-  }
-  [[nodiscard]] std::size_t size() const { return paused_.size(); }
-  /// A new connection: the hub says again what it wants paused.
-  void clear() { paused_.clear(); }
-
- private:
-  static constexpr std::uint64_t code(const proto::flow::Target& target) {
-    return stream_code(target.kind, static_cast<std::uint8_t>(target.lane), target.dst);
-  }
-  std::map<std::uint64_t, std::int64_t> paused_;  ///< since when
-};
 
 /// The sending half of a node: any thread puts messages in, whoever finds the socket idle writes
 /// what is there.
@@ -221,9 +179,6 @@ class Outbound {
   void put_piece(Outgoing& message, SendProgress& progress, proto::Fragmenter& fragmenter)
       GIMNET_REQUIRES(mutex_);
   [[nodiscard]] std::uint32_t piece_max(const Outgoing& message) const GIMNET_REQUIRES(mutex_);
-  void redirect(Outgoing& message) const GIMNET_REQUIRES(mutex_);
-  /// The hub refuses the service whose group that is or was.
-  [[nodiscard]] bool refuses(std::uint32_t group) const GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status wait_for_turn(Outgoing& message, std::size_t frame_size,
                                          const SendProgress* own, Deadline deadline)
       GIMNET_REQUIRES(mutex_);
@@ -301,10 +256,7 @@ class Outbound {
   std::optional<std::uint32_t> hub_retains_
       GIMNET_GUARDED_BY(mutex_);  ///< SessionTerms::retained_bytes_max
   std::uint32_t waiting_ GIMNET_GUARDED_BY(mutex_) = 0;
-  bool declaring_ GIMNET_GUARDED_BY(mutex_) = false;
-  /// Groups of own services that a program may not know yet, by former ones; 0: refused. Limit: own
-  /// services, and former groups that a program was told of.
-  SendQueue::GroupMap moves_ GIMNET_GUARDED_BY(mutex_);
+  GroupMoves moves_ GIMNET_GUARDED_BY(mutex_);
 
   bool writing_ GIMNET_GUARDED_BY(mutex_) = false;  ///< somebody is between gather() and commit()
   bool full_ GIMNET_GUARDED_BY(mutex_) = false;     ///< the kernel took less than was offered

@@ -27,7 +27,7 @@ bool Outbound::put_held(HeldMessage& held) {
   while (!held.fragmenter.done()) {
     if (held.progress.lost(epochs_)) return true;
     if (!has_room(message, frame, &held.progress)) return false;
-    if (message.is_group() && refuses(message.parts().header.dst)) {
+    if (message.is_group() && moves_.refuses(message.parts().header.dst)) {
       lost_ = true;
       return true;
     }

@@ -131,7 +131,7 @@ bool Outbound::has_room(const Outgoing& message, std::size_t frame_size, const S
     const bool may_be_held = !message.patient() && message.size() > proto::kUncutMessageMax;
     if (may_be_held && !held_.has_place(message.size())) return false;
   }
-  if (declaring_ && message.parts().header.kind == proto::Kind::group) return false;
+  if (message.is_group() && !moves_.settled()) return false;
   if (message.replaceable() &&
       queue_.would_replace(latest_stream_of(message.parts().header, message.parts().key))) {
     return true;
@@ -178,9 +178,9 @@ void Outbound::probe(const SendProgress& own) {
 nif_status Outbound::wait_for_turn(Outgoing& message, std::size_t frame_size,
                                    const SendProgress* own, Deadline deadline) {
   if (own != nullptr) return wait_until_it_may_go(message, frame_size, own, deadline);
-  redirect(message);
+  moves_.redirect(message);
   const nif_status status = wait_until_it_may_go(message, frame_size, own, deadline);
-  redirect(message);  // its service may have another group since it waits
+  moves_.redirect(message);  // its service may have another group since it waits
   return status;
 }
 
@@ -193,8 +193,8 @@ nif_status Outbound::wait_until_it_may_go(const Outgoing& message, std::size_t f
     if (own != nullptr) {
       if (const nif_status status = check_progress(*own); status != NIF_OK) return status;
     }
-    const bool settled = state_ == State::connected && !declaring_;
-    if (settled && message.is_group() && refuses(message.parts().header.dst)) {
+    const bool settled = state_ == State::connected && moves_.settled();
+    if (settled && message.is_group() && moves_.refuses(message.parts().header.dst)) {
       return fail(NIF_REFUSED,
                   "the hub did not take the service again, after a break or another name");
     }

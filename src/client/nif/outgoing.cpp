@@ -5,7 +5,7 @@
 #include <string>
 
 #include "base/endian.hpp"
-#include "client/nif/outbound.hpp"
+#include "client/nif/pause_table.hpp"
 #include "client/nif/sized_struct.hpp"
 #include "proto/frame/fragmenter.hpp"
 #include "proto/gimi/message_header.hpp"

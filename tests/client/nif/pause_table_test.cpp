@@ -1,4 +1,4 @@
-#include "client/nif/outbound.hpp"
+#include "client/nif/pause_table.hpp"
 
 #include <gtest/gtest.h>
 
