@@ -86,7 +86,7 @@ void Outbound::write_rounds(bool by_library) {
   const int rounds_max = by_library && gather_burst() ? 1 : kWriteRoundsMax;
   int rounds = 0;
   // While the library's thread is in a callback nobody else would write the rest.
-  while ((rounds < rounds_max || in_callbacks_) && state_ == State::connected && write_once())
+  while ((rounds < rounds_max || in_callbacks_) && connection_.connected() && write_once())
     ++rounds;
   end_writing();
   last_write_ns_ = steady_now_ns();
@@ -99,7 +99,7 @@ void Outbound::write_rounds(bool by_library) {
 void Outbound::write_pending(bool writable) {
   const MutexLock lock(mutex_);
   wake_raised_ = false;
-  if (state_ != State::connected || writing_ || broken_ || (full_ && !writable)) return;
+  if (!connection_.connected() || writing_ || broken_ || (full_ && !writable)) return;
   full_ = false;
   write_rounds(true);
 }
@@ -108,7 +108,7 @@ void Outbound::begin_callbacks() {
   const MutexLock lock(mutex_);
   in_callbacks_ = true;
   // Not gathered, since what is left behind one write would wait for the program.
-  if (wake_raised_ && state_ == State::connected && !writing_ && !full_ && !broken_)
+  if (wake_raised_ && connection_.connected() && !writing_ && !full_ && !broken_)
     write_rounds(false);
 }
 

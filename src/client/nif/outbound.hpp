@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/mutex.hpp"
+#include "client/nif/connection_state.hpp"
 #include "client/nif/error.hpp"
 #include "client/nif/group_moves.hpp"
 #include "client/nif/held_messages.hpp"
@@ -141,7 +142,6 @@ class Outbound {
   /// So much of a burst is gathered for one write.
   static constexpr std::size_t kBurstBytes = 64 * 1024;
 
-  enum class State : std::uint8_t { away, connected, ended };
   /// Holds the lock. Memory that runs out meanwhile leaves a queue that is not in order.
   class GIMNET_SCOPED_CAPABILITY Inside {
    public:
@@ -163,7 +163,7 @@ class Outbound {
   /// The one place where a connection ends for want of memory.
   void on_no_memory() GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool usable() const GIMNET_REQUIRES(mutex_) {
-    return state_ == State::connected && !no_memory_;
+    return connection_.connected() && !no_memory_;
   }
   [[nodiscard]] nif_status send_whole(Outgoing& message, Deadline deadline) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status send_fragments(Outgoing& message, Deadline deadline)
@@ -198,9 +198,6 @@ class Outbound {
   void probe(const SendProgress& own) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool write_here() GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool ask_for_confirm() GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] std::string away_words() const GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] nif_status not_connected() const GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] nif_status no_turn() const GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool may_go(const Outgoing& message, std::size_t frame_size,
                             const SendProgress* own) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool has_room(const Outgoing& message, std::size_t frame_size,
@@ -229,9 +226,7 @@ class Outbound {
 
   Mutex mutex_;
   Condition changed_;
-  State state_ GIMNET_GUARDED_BY(mutex_) = State::away;
-  Failure end_ GIMNET_GUARDED_BY(mutex_);                                   ///< of State::ended
-  std::int64_t away_since_ns_ GIMNET_GUARDED_BY(mutex_) = steady_now_ns();  ///< of State::away
+  ConnectionState connection_ GIMNET_GUARDED_BY(mutex_);
   std::uint32_t id_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::uint32_t frame_bytes_max_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::uint64_t epochs_ GIMNET_GUARDED_BY(mutex_) = 0;  ///< grows when counts begin anew

@@ -7,7 +7,7 @@
 namespace gimnet::nif {
 
 void Outbound::put_held() {
-  if (state_ != State::connected && !leaving_) return;
+  if (!connection_.connected() && !leaving_) return;
   for (auto each = held_.begin(); each != held_.end();) {
     if (!put_held(*each)) {
       ++each;
@@ -46,7 +46,7 @@ void Outbound::drop_held() {
 void Outbound::look_after_held() {
   const Inside inside(*this);
   if (pauses_.lift_overdue(hub_of(NodeId{id_}), steady_now_ns())) notify_waiting();
-  if (state_ != State::connected || held_.empty()) return;
+  if (!connection_.connected() || held_.empty()) return;
   for (const HeldMessage& held : held_) {
     if (held.progress.windowed && held.progress.window.room() == 0) probe(held.progress);
   }
@@ -87,17 +87,14 @@ std::optional<std::uint64_t> Outbound::attach(net::Stream& stream, const Session
   if (*missing > 0) put_flow(proto::flow::Skip{proto::DropReason::link_lost, *missing});
   // A handle that is being closed stays closed: whoever waits in it leaves, and nobody else comes
   // in.
-  if (state_ != State::ended) state_ = State::connected;
+  connection_.connect();
   changed_.notify_all();
   return missing;
 }
 
 void Outbound::detach(bool again) {
   const MutexLock lock(mutex_);
-  if (state_ == State::connected) {
-    state_ = State::away;
-    away_since_ns_ = steady_now_ns();
-  }
+  connection_.lose();
   while (writing_) static_cast<void>(wait(kNever));
   stream_ = nullptr;
   full_ = false;
@@ -118,9 +115,7 @@ void Outbound::detach(bool again) {
 
 void Outbound::end(const Failure& failure) {
   const MutexLock lock(mutex_);
-  if (state_ == State::ended && failure.status != NIF_CLOSED) return;
-  state_ = State::ended;
-  end_ = failure;
+  connection_.end(failure);
   changed_.notify_all();
 }
 
@@ -147,9 +142,9 @@ bool Outbound::write_last() {
 nif_status Outbound::wait_connected(Deadline deadline) {
   const MutexLock lock(mutex_);
   for (;;) {
-    if (state_ == State::connected) return NIF_OK;
-    if (state_ == State::ended) return not_connected();
-    if (deadline != kNever && steady_now_ns() >= deadline) return not_connected();
+    if (connection_.connected()) return NIF_OK;
+    if (connection_.ended()) return connection_.not_connected();
+    if (deadline != kNever && steady_now_ns() >= deadline) return connection_.not_connected();
     static_cast<void>(wait(deadline));
   }
 }

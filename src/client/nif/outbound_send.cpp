@@ -94,28 +94,10 @@ void Outbound::write_or_leave(bool more) {
 /// Writes in this thread if there is something to write and nobody else does. True: it tried,
 /// without the lock, so that everything may be different now.
 bool Outbound::write_here() {
-  if (state_ != State::connected || writing_ || full_ || broken_ || all_sent()) return false;
+  if (!connection_.connected() || writing_ || full_ || broken_ || all_sent()) return false;
   const std::uint64_t before = write_calls_;
   write_rounds(false);
   return write_calls_ != before;
-}
-
-/// Since when there is no connection, for the sentences of calls that failed meanwhile.
-std::string Outbound::away_words() const {
-  const std::int64_t tenths = (steady_now_ns() - away_since_ns_) / 100'000'000;
-  return "the hub has been away for " + std::to_string(tenths / 10) + "." +
-         std::to_string(tenths % 10) + " s; the library dials again, so try again later";
-}
-
-nif_status Outbound::not_connected() const {
-  if (state_ == State::ended) return fail(end_);
-  return fail(NIF_NOT_CONNECTED, away_words());
-}
-
-/// A message waited for its turn as long as it may.
-nif_status Outbound::no_turn() const {
-  return fail(NIF_TIMEOUT,
-              state_ == State::away ? away_words() : std::string("no room within the time given"));
 }
 
 bool Outbound::may_go(const Outgoing& message, std::size_t frame_size, const SendProgress* own) {
@@ -189,11 +171,11 @@ nif_status Outbound::wait_until_it_may_go(const Outgoing& message, std::size_t f
   std::int64_t probe_at = 0;
   for (;;) {
     const bool waits = queue_.resume() && (own != nullptr || !message.not_while_away());
-    if (state_ == State::ended || (state_ == State::away && !waits)) return not_connected();
+    if (connection_.ended() || (connection_.away() && !waits)) return connection_.not_connected();
     if (own != nullptr) {
       if (const nif_status status = check_progress(*own); status != NIF_OK) return status;
     }
-    const bool settled = state_ == State::connected && moves_.settled();
+    const bool settled = connection_.connected() && moves_.settled();
     if (settled && message.is_group() && moves_.refuses(message.parts().header.dst)) {
       return fail(NIF_REFUSED,
                   "the hub did not take the service again, after a break or another name");
@@ -203,9 +185,9 @@ nif_status Outbound::wait_until_it_may_go(const Outgoing& message, std::size_t f
     // anybody waits for room.
     if (write_here()) continue;
     const std::int64_t now = steady_now_ns();
-    if (now >= deadline) return no_turn();
+    if (now >= deadline) return connection_.no_turn();
     const bool stalled =
-        own != nullptr && own->windowed && own->window.room() == 0 && state_ == State::connected;
+        own != nullptr && own->windowed && own->window.room() == 0 && connection_.connected();
     if (stalled && probe_at == 0) probe_at = now + kProbeNs;
     if (stalled && now >= probe_at) {
       probe(*own);
@@ -346,7 +328,7 @@ nif_status Outbound::check_retained(Outgoing& message) const {
 
 nif_status Outbound::flush() {
   const MutexLock lock(mutex_);
-  if (state_ != State::connected) return not_connected();
+  if (!connection_.connected()) return connection_.not_connected();
   static_cast<void>(write_here());
   return NIF_OK;
 }
@@ -355,7 +337,7 @@ nif_status Outbound::flush() {
 /// True: it was asked. One question at a time: the answer to an earlier one may be all that is
 /// wanted, and if not the next one follows it.
 bool Outbound::ask_for_confirm() {
-  if (state_ != State::connected || asked_ || writing_ || broken_ || !queue_.all_written())
+  if (!connection_.connected() || asked_ || writing_ || broken_ || !queue_.all_written())
     return false;
   put_flow(proto::flow::Ping{kAskSequence, wall_now_ns()});
   asked_ = true;
@@ -366,8 +348,8 @@ bool Outbound::ask_for_confirm() {
 nif_status Outbound::drain(Deadline deadline) {
   const Inside inside(*this);
   for (;;) {
-    if (state_ == State::ended) return not_connected();
-    if (state_ == State::away && !queue_.resume()) return not_connected();
+    if (connection_.ended()) return connection_.not_connected();
+    if (connection_.away() && !queue_.resume()) return connection_.not_connected();
     // An empty queue proves nothing once something was thrown out of it.
     if (std::exchange(lost_, false)) {
       return fail(NIF_NOT_CONNECTED,
