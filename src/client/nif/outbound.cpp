@@ -1,11 +1,7 @@
 #include "client/nif/outbound.hpp"
 
-#include <algorithm>
 #include <array>
-#include <cstring>
 #include <new>
-
-#include "proto/frame/fragmenter.hpp"
 
 namespace gimnet::nif {
 namespace {
@@ -52,7 +48,7 @@ void Outbound::on_no_memory() {
 bool Outbound::write_gathered() {
   if (!held_.empty()) put_held();
   if (leaving_ && queue_.all_written() && !goodbye_.empty()) {
-    put_frame(queue_.append_control(goodbye_.size()), goodbye_);
+    frames_.append_control(goodbye_);
     goodbye_.clear();
   }
   const auto pieces = queue_.gather();
@@ -124,25 +120,10 @@ Outbound::Wants Outbound::wants() {
           last_write_ns_};
 }
 
-/// Copies a frame into the queue under the id that the node has now.
-void Outbound::put_frame(std::span<std::byte> memory, std::span<const std::byte> frame) {
-  proto::FrameHeader header = proto::load_header(frame.data());
-  header.src = id_;
-  std::memcpy(memory.data(), frame.data(), frame.size());
-  proto::store_header(memory.data(), header);
-}
-
-void Outbound::put_flow(const proto::flow::Message& message) {
-  std::array<std::byte, proto::flow::kFrameSizeMax> frame;
-  const std::size_t size = proto::flow::encode_frame(message, NodeId{0}, frame);
-  put_frame(queue_.append_control(size), std::span<const std::byte>(frame).first(size));
-}
-
 bool Outbound::post(std::span<const std::byte> frame) {
   const Inside inside(*this);
   if (!usable()) return false;
-  put_frame(queue_.append_control(frame.size()), frame);
-  count_appended(kBurstBytes);  // before all messages: what gathers does not wait for more
+  frames_.append_control(frame);
   write_or_leave(false);
   return true;
 }
@@ -158,8 +139,7 @@ bool Outbound::post_data(std::span<const std::byte> frame) {
   const proto::FrameHeader header = proto::load_header(frame.data());
   if (pauses_.is_paused(stream_code(header.kind, header.lane, header.dst))) return false;
   if (!usable()) return false;
-  put_frame(queue_.append(header.lane, frame.size()), frame);
-  count_appended(kBurstBytes);
+  frames_.append_frame(frame);
   write_or_leave(false);
   return true;
 }
@@ -174,50 +154,17 @@ void Outbound::forget_retained(const std::string& service) {
   last_.forget(service);
 }
 
-void Outbound::put_piece(const LastMessage& last, const proto::FrameParts& parts,
-                         std::uint32_t offset) {
-  const proto::FrameHeader& header = parts.header;
-  const std::size_t bytes = proto::prefix_size(parts) + parts.payload_size;
-  const bool replaceable =
-      header.policy() == proto::Policy::latest && last.payload.size() <= proto::kUncutMessageMax;
-  const auto memory =
-      replaceable ? queue_.append_latest(header.lane, bytes, latest_stream_of(header, parts.key))
-                  : queue_.append(header.lane, bytes);
-  const std::size_t prefix = proto::write_prefix(parts, memory);
-  std::copy_n(last.payload.data() + offset, parts.payload_size, memory.data() + prefix);
-  count_appended(bytes);
-}
-
 void Outbound::send_last_again(const std::string& service) {
   const Inside inside(*this);
   const LastMessage* const last = last_.find(service);
   if (last == nullptr || !usable()) return;
-  proto::FrameParts parts = last->parts();
-  const proto::FrameHeader& header = parts.header;
+  const proto::FrameHeader& header = last->header;
   const auto newer = in_progress_.find(stream_code(header.kind, header.lane, header.dst));
   if (newer != in_progress_.end() && newer->second->number != 0 &&
       newer->second->epoch == epochs_) {
     return;  // it goes on, and is about to be the last one
   }
-  parts.header.src = id_;
-  parts.header.flags &=
-      static_cast<std::uint8_t>(~proto::kFlagReport);  // it was asked for at its first sending
-  const auto total = static_cast<std::uint32_t>(last->payload.size());
-  std::uint32_t piece_max = proto::kUncutMessageMax;
-  if (proto::needs_fragment_header(total))
-    parts.fragment = proto::FragmentHeader{next_message_++, 0, total};
-  if (total > proto::kUncutMessageMax) {
-    const std::size_t prefix = proto::prefix_size(parts) - proto::kHeaderSize;
-    piece_max = static_cast<std::uint32_t>(
-        std::min<std::size_t>(proto::kFragmentPayload, frame_bytes_max_ - prefix));
-  }
-  std::uint32_t offset = 0;
-  do {
-    parts.payload_size = std::min(piece_max, total - offset);
-    if (parts.fragment) parts.fragment->offset = offset;
-    put_piece(*last, parts, offset);
-    offset += static_cast<std::uint32_t>(parts.payload_size);
-  } while (offset < total);
+  frames_.append_last(*last);
   write_or_leave(false);
 }
 
@@ -253,7 +200,7 @@ std::uint32_t Outbound::waiting() {
 
 std::uint32_t Outbound::id() {
   const MutexLock lock(mutex_);
-  return id_;
+  return frames_.id();
 }
 
 void Outbound::on_pause(const proto::flow::Target& target) {

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <exception>
@@ -13,6 +12,7 @@
 #include "base/mutex.hpp"
 #include "client/nif/connection_state.hpp"
 #include "client/nif/error.hpp"
+#include "client/nif/frame_appender.hpp"
 #include "client/nif/group_moves.hpp"
 #include "client/nif/held_messages.hpp"
 #include "client/nif/last_messages.hpp"
@@ -48,7 +48,11 @@ class Outbound {
   /// `wake` rouses the library's thread, which then calls write_pending().
   Outbound(const SendQueue::Limits& limits, net::WakeSignal& wake,
            std::size_t last_message_bytes = LastMessages::kMessageBytesDefault)
-      : wake_(wake), queue_(limits), held_(limits.queue_bytes), last_(last_message_bytes) {}
+      : wake_(wake),
+        queue_(limits),
+        frames_(queue_),
+        held_(limits.queue_bytes),
+        last_(last_message_bytes) {}
 
   // Any thread.
   [[nodiscard]] nif_status send(Outgoing& message, Deadline deadline) GIMNET_EXCLUDES(mutex_);
@@ -139,8 +143,6 @@ class Outbound {
  private:
   /// A send that follows the last write, or the send before, within this time is part of a burst.
   static constexpr std::int64_t kQuickNs = 3'000;
-  /// So much of a burst is gathered for one write.
-  static constexpr std::size_t kBurstBytes = 64 * 1024;
 
   /// Holds the lock. Memory that runs out meanwhile leaves a queue that is not in order.
   class GIMNET_SCOPED_CAPABILITY Inside {
@@ -176,9 +178,6 @@ class Outbound {
   void put_held() GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool put_held(HeldMessage& held) GIMNET_REQUIRES(mutex_);
   void drop_held() GIMNET_REQUIRES(mutex_);
-  void put_piece(Outgoing& message, SendProgress& progress, proto::Fragmenter& fragmenter)
-      GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] std::uint32_t piece_max(const Outgoing& message) const GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status wait_for_turn(Outgoing& message, std::size_t frame_size,
                                          const SendProgress* own, Deadline deadline)
       GIMNET_REQUIRES(mutex_);
@@ -186,16 +185,9 @@ class Outbound {
                                                 const SendProgress* own, Deadline deadline)
       GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status check_progress(const SendProgress& own) const GIMNET_REQUIRES(mutex_);
-  void put_frame(std::span<std::byte> memory, std::span<const std::byte> frame)
-      GIMNET_REQUIRES(mutex_);
-  /// Queues a FLOW frame.
-  void put_flow(const proto::flow::Message& message) GIMNET_REQUIRES(mutex_);
-  void put_piece(const LastMessage& last, const proto::FrameParts& parts, std::uint32_t offset)
-      GIMNET_REQUIRES(mutex_);
   [[nodiscard]] std::uint32_t number_of(Outgoing& message, bool windowed) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool is_retained(const Outgoing& message) const GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status check_retained(Outgoing& message) const GIMNET_REQUIRES(mutex_);
-  void probe(const SendProgress& own) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool write_here() GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool ask_for_confirm() GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool may_go(const Outgoing& message, std::size_t frame_size,
@@ -203,11 +195,8 @@ class Outbound {
   [[nodiscard]] bool has_room(const Outgoing& message, std::size_t frame_size,
                               const SendProgress* own) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool wait(Deadline deadline) GIMNET_REQUIRES(mutex_);
-  void put(Outgoing& message, std::optional<proto::FragmentHeader> fragment, std::uint32_t offset,
-           std::uint32_t size, bool report) GIMNET_REQUIRES(mutex_);
   void write_or_leave(bool more) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool in_burst() GIMNET_REQUIRES(mutex_);
-  void count_appended(std::size_t bytes) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool gather_burst() GIMNET_REQUIRES(mutex_);
   void write_rounds(bool by_library) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool write_once() GIMNET_REQUIRES(mutex_);
@@ -227,8 +216,6 @@ class Outbound {
   Mutex mutex_;
   Condition changed_;
   ConnectionState connection_ GIMNET_GUARDED_BY(mutex_);
-  std::uint32_t id_ GIMNET_GUARDED_BY(mutex_) = 0;
-  std::uint32_t frame_bytes_max_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::uint64_t epochs_ GIMNET_GUARDED_BY(mutex_) = 0;  ///< grows when counts begin anew
   bool lost_ GIMNET_GUARDED_BY(mutex_) =
       false;  ///< frames were given up unconfirmed, and drain() has not said so yet
@@ -236,6 +223,7 @@ class Outbound {
       false;  ///< drain() asked this hub for a CONFIRM, and none came since
   net::Stream* stream_ GIMNET_GUARDED_BY(mutex_) = nullptr;
   SendQueue queue_ GIMNET_GUARDED_BY(mutex_);
+  FrameAppender frames_ GIMNET_GUARDED_BY(mutex_);  ///< of queue_
   std::vector<std::byte> goodbye_
       GIMNET_GUARDED_BY(mutex_);  ///< waits until everything else is written
   PauseTable pauses_ GIMNET_GUARDED_BY(mutex_);
@@ -243,7 +231,6 @@ class Outbound {
       GIMNET_GUARDED_BY(mutex_);  ///< by stream
   HeldMessages held_ GIMNET_GUARDED_BY(mutex_);
   bool leaving_ GIMNET_GUARDED_BY(mutex_) = false;  ///< what waits is the last that goes
-  std::uint32_t next_message_ GIMNET_GUARDED_BY(mutex_) = 1;
   ReportedMessages reported_ GIMNET_GUARDED_BY(mutex_);
   bool reports_wanted_ GIMNET_GUARDED_BY(mutex_) =
       false;  ///< the program sent something with NIF_FLAG_REPORT
@@ -262,8 +249,6 @@ class Outbound {
   bool in_callbacks_ GIMNET_GUARDED_BY(mutex_) = false;  ///< the library's thread cannot write
   std::int64_t last_write_ns_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::uint32_t quick_sends_ GIMNET_GUARDED_BY(mutex_) = 0;
-  /// Written under the lock, read by gather_burst() without.
-  std::atomic<std::uint64_t> appended_bytes_{0};
 
   std::uint64_t messages_sent_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::uint64_t bytes_sent_ GIMNET_GUARDED_BY(mutex_) = 0;

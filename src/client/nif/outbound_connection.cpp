@@ -22,8 +22,7 @@ void Outbound::put_held() {
 /// True: nothing of it is left, or it is lost.
 bool Outbound::put_held(HeldMessage& held) {
   Outgoing& message = *held.message;
-  const std::size_t frame =
-      proto::prefix_size(message.parts()) + proto::kFragmentHeaderSize + piece_max(message);
+  const std::size_t frame = FrameAppender::frame_size(message, true, frames_.piece_max(message));
   while (!held.fragmenter.done()) {
     if (held.progress.lost(epochs_)) return true;
     if (!has_room(message, frame, &held.progress)) return false;
@@ -31,7 +30,7 @@ bool Outbound::put_held(HeldMessage& held) {
       lost_ = true;
       return true;
     }
-    put_piece(message, held.progress, held.fragmenter);
+    frames_.append_piece(message, held.progress, held.fragmenter);
   }
   return true;
 }
@@ -45,10 +44,11 @@ void Outbound::drop_held() {
 
 void Outbound::look_after_held() {
   const Inside inside(*this);
-  if (pauses_.lift_overdue(hub_of(NodeId{id_}), steady_now_ns())) notify_waiting();
+  if (pauses_.lift_overdue(hub_of(NodeId{frames_.id()}), steady_now_ns())) notify_waiting();
   if (!connection_.connected() || held_.empty()) return;
   for (const HeldMessage& held : held_) {
-    if (held.progress.windowed && held.progress.window.room() == 0) probe(held.progress);
+    if (held.progress.windowed && held.progress.window.room() == 0)
+      frames_.append_probe(held.progress.dst);
   }
   write_or_leave(false);
 }
@@ -75,8 +75,7 @@ std::optional<std::uint64_t> Outbound::attach(net::Stream& stream, const Session
   const Inside inside(*this);
   const std::optional<std::uint64_t> missing = take_up(session);
   if (!missing) return std::nullopt;
-  id_ = session.id;
-  frame_bytes_max_ = session.frame_bytes_max;
+  frames_.begin_session(session.id, session.frame_bytes_max);
   hub_retains_ = session.retained_bytes_max;
   pauses_.clear();
   stream_ = &stream;
@@ -84,7 +83,7 @@ std::optional<std::uint64_t> Outbound::attach(net::Stream& stream, const Session
   full_ = false;
   broken_ = false;
   last_write_ns_ = steady_now_ns();
-  if (*missing > 0) put_flow(proto::flow::Skip{proto::DropReason::link_lost, *missing});
+  if (*missing > 0) frames_.append_flow(proto::flow::Skip{proto::DropReason::link_lost, *missing});
   // A handle that is being closed stays closed: whoever waits in it leaves, and nobody else comes
   // in.
   connection_.connect();
@@ -121,7 +120,7 @@ void Outbound::end(const Failure& failure) {
 
 void Outbound::begin_leaving(std::uint64_t taken, std::span<const std::byte> goodbye) {
   const Inside inside(*this);
-  if (taken != 0) put_flow(proto::flow::Confirm{taken});
+  if (taken != 0) frames_.append_flow(proto::flow::Confirm{taken});
   goodbye_.assign(goodbye.begin(), goodbye.end());
   leaving_ = true;
   // Nobody hears where the services are now.

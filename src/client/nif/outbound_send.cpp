@@ -28,12 +28,6 @@ constexpr std::uint32_t kAskSequence = 0;
 /// is still there.
 constexpr std::int64_t kProbeNs = 1'000'000'000;
 
-/// Room for a frame with this payload before its prefix is written.
-std::size_t frame_size(const Outgoing& message, bool fragment, std::uint32_t payload) {
-  return proto::prefix_size(message.parts()) + (fragment ? proto::kFragmentHeaderSize : 0) +
-         payload;
-}
-
 }  // namespace
 
 bool Outbound::in_burst() {
@@ -42,30 +36,22 @@ bool Outbound::in_burst() {
   return quick_sends_ == kQuickSends;
 }
 
-void Outbound::count_appended(std::size_t bytes) {
-  // Partner: gather_burst(), to which any recent value is good enough.
-  appended_bytes_.store(appended_bytes_.load(std::memory_order_relaxed) + bytes,
-                        std::memory_order_relaxed);
-}
-
 /// The library's thread, woken because of a burst: lets messages gather as long as they come one
 /// right after the other, so that a write takes hundreds of them along. It gives its processor to
 /// whoever wants it and does not sleep: when they stop coming they are written at once. Without it
 /// bursts of 16 B have 0.68 times the messages a second, for 1.36 times the processor time of all
 /// (median of 8 pairs, one hub, TCP, two processors). False: there is no burst, or enough of it.
 bool Outbound::gather_burst() {
-  if (quick_sends_ < kQuickSends || queue_.unsent_bytes() >= kBurstBytes || waiting_ > 0)
+  if (quick_sends_ < kQuickSends || queue_.unsent_bytes() >= AppendedBytes::kBurst || waiting_ > 0)
     return false;
-  // relaxed: see count_appended()
-  const std::uint64_t gathered = appended_bytes_.load(std::memory_order_relaxed);
-  const std::uint64_t enough = gathered + kBurstBytes - queue_.unsent_bytes();
+  const AppendedBytes& all = frames_.appended();
+  const std::uint64_t enough = all.value() + AppendedBytes::kBurst - queue_.unsent_bytes();
   mutex_.unlock();
   std::uint64_t appended = 0;
   const std::int64_t begin = steady_now_ns();
   for (std::int64_t now = begin, last = begin; now - last < kQuickNs && now - begin < kGatherNsMax;
        now = steady_now_ns()) {
-    const std::uint64_t before =
-        std::exchange(appended, appended_bytes_.load(std::memory_order_relaxed));  // the same
+    const std::uint64_t before = std::exchange(appended, all.value());
     if (appended >= enough) break;
     if (appended != before) last = now;
     std::this_thread::yield();
@@ -140,22 +126,6 @@ nif_status Outbound::check_progress(const SendProgress& own) const {
   return NIF_OK;
 }
 
-/// A receiver that crashed says nothing more; a TAKEN of no message, which its hub reports if there
-/// is nobody to take it, tells that from one that is slow.
-void Outbound::probe(const SendProgress& own) {
-  proto::FrameHeader header;
-  header.length = proto::kTakenSize;
-  header.dst = own.dst;
-  header.src = id_;
-  header.kind = proto::Kind::taken;
-  header.flags = proto::kFlagReport;
-  header.lane = static_cast<std::uint8_t>(proto::Lane::real_time);
-  const auto memory = queue_.append(header.lane, header.frame_size());
-  proto::store_header(memory.data(), header);
-  proto::encode_taken({}, memory.subspan<proto::kHeaderSize, proto::kTakenSize>());
-  write_or_leave(false);
-}
-
 /// Waits until a frame of the message may enter the queue. `own`: the message is under way already.
 nif_status Outbound::wait_for_turn(Outgoing& message, std::size_t frame_size,
                                    const SendProgress* own, Deadline deadline) {
@@ -190,66 +160,38 @@ nif_status Outbound::wait_until_it_may_go(const Outgoing& message, std::size_t f
         own != nullptr && own->windowed && own->window.room() == 0 && connection_.connected();
     if (stalled && probe_at == 0) probe_at = now + kProbeNs;
     if (stalled && now >= probe_at) {
-      probe(*own);
+      frames_.append_probe(own->dst);
+      write_or_leave(false);
       probe_at = now + kProbeNs;
     }
     static_cast<void>(wait(stalled ? std::min(deadline, probe_at) : deadline));
   }
 }
 
-void Outbound::put(Outgoing& message, std::optional<proto::FragmentHeader> fragment,
-                   std::uint32_t offset, std::uint32_t size, bool report) {
-  const std::size_t bytes = frame_size(message, fragment.has_value(), size);
-  const proto::FrameHeader& header = message.parts().header;
-  const auto memory =
-      message.replaceable()
-          ? queue_.append_latest(header.lane, bytes, latest_stream_of(header, message.parts().key))
-          : queue_.append(header.lane, bytes);
-  message.write_frame(memory, id_, fragment, offset, size, report);
-  // An urgent message ends the gathering.
-  count_appended(header.lane == static_cast<std::uint8_t>(proto::Lane::real_time) ? kBurstBytes
-                                                                                  : bytes);
-}
-
 /// For a message that has a fragment header.
 std::uint32_t Outbound::number_of(Outgoing& message, bool windowed) {
-  const std::uint32_t number = next_message_++;
+  const std::uint32_t number = frames_.next_number();
   if (message.reported() || windowed || is_retained(message)) reported_.remember(number, message);
   return number;
 }
 
 nif_status Outbound::send_whole(Outgoing& message, Deadline deadline) {
   const bool with_header = proto::needs_fragment_header(message.size());
-  const nif_status turn =
-      wait_for_turn(message, frame_size(message, with_header, message.size()), nullptr, deadline);
+  const std::size_t frame = FrameAppender::frame_size(message, with_header, message.size());
+  const nif_status turn = wait_for_turn(message, frame, nullptr, deadline);
   if (turn != NIF_OK) return turn;
-  std::optional<proto::FragmentHeader> fragment;
-  if (with_header) fragment = proto::FragmentHeader{number_of(message, false), 0, message.size()};
-  put(message, fragment, 0, message.size(), false);
+  std::optional<std::uint32_t> number;
+  if (with_header) number = number_of(message, false);
+  frames_.append_whole(message, number);
   return NIF_OK;
 }
 
-std::uint32_t Outbound::piece_max(const Outgoing& message) const {
-  const std::size_t prefix = frame_size(message, true, 0) - proto::kHeaderSize;
-  return static_cast<std::uint32_t>(
-      std::min<std::size_t>(proto::kFragmentPayload, frame_bytes_max_ - prefix));
-}
-
-/// The next fragment. REQUIRES: it may go.
-void Outbound::put_piece(Outgoing& message, SendProgress& progress, proto::Fragmenter& fragmenter) {
-  const proto::Piece piece = fragmenter.next(
-      progress.windowed ? std::min(progress.window.room(), piece_max(message)) : UINT32_MAX);
-  const proto::FragmentHeader fragment{progress.number, piece.offset, message.size()};
-  put(message, fragment, piece.offset, piece.size, progress.windowed);
-  if (progress.windowed) progress.window.on_sent(piece.size);
-}
-
 nif_status Outbound::send_pieces(Outgoing& message, SendProgress& progress, Deadline deadline) {
-  const std::uint32_t largest = piece_max(message);
+  const std::uint32_t largest = frames_.piece_max(message);
+  const std::size_t frame = FrameAppender::frame_size(message, true, largest);
   proto::Fragmenter fragmenter(message.size(), largest);
   while (!fragmenter.done()) {
-    const nif_status turn =
-        wait_for_turn(message, frame_size(message, true, largest), &progress, deadline);
+    const nif_status turn = wait_for_turn(message, frame, &progress, deadline);
     if (turn == NIF_TIMEOUT && progress.number != 0)
       return hold_rest(message, progress, fragmenter);
     if (turn != NIF_OK) return turn;
@@ -258,7 +200,7 @@ nif_status Outbound::send_pieces(Outgoing& message, SendProgress& progress, Dead
       progress.epoch = epochs_;
       progress.window = proto::SendWindow(progress.number, message.size());
     }
-    put_piece(message, progress, fragmenter);
+    frames_.append_piece(message, progress, fragmenter);
     write_or_leave(!fragmenter.done() || message.more());
   }
   return NIF_OK;
@@ -273,8 +215,8 @@ nif_status Outbound::hold_rest(Outgoing& message, const SendProgress& progress,
 }
 
 nif_status Outbound::send_fragments(Outgoing& message, Deadline deadline) {
-  const nif_status turn =
-      wait_for_turn(message, frame_size(message, true, proto::kFragmentPayload), nullptr, deadline);
+  const std::size_t frame = FrameAppender::frame_size(message, true, proto::kFragmentPayload);
+  const nif_status turn = wait_for_turn(message, frame, nullptr, deadline);
   if (turn != NIF_OK) return turn;
   SendProgress progress{.number = 0,
                         .dst = message.parts().header.dst,
@@ -339,7 +281,7 @@ nif_status Outbound::flush() {
 bool Outbound::ask_for_confirm() {
   if (!connection_.connected() || asked_ || writing_ || broken_ || !queue_.all_written())
     return false;
-  put_flow(proto::flow::Ping{kAskSequence, wall_now_ns()});
+  frames_.append_flow(proto::flow::Ping{kAskSequence, wall_now_ns()});
   asked_ = true;
   write_or_leave(false);
   return true;
