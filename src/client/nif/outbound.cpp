@@ -1,123 +1,34 @@
 #include "client/nif/outbound.hpp"
 
 #include <array>
-#include <new>
 
 namespace gimnet::nif {
-namespace {
-
-/// After so many writes in a row a sender leaves the rest to the library's thread: its own message
-/// went long ago.
-constexpr int kWriteRoundsMax = 8;
-
-}  // namespace
-
-bool Outbound::wait(Deadline deadline) {
-  ++waiting_;
-  const bool in_time = changed_.wait_until(mutex_, deadline);
-  --waiting_;
-  return in_time;
-}
-
-void Outbound::notify_waiting() {
-  if (waiting_ > 0) changed_.notify_all();
-}
-
-void Outbound::wake_library() {
-  if (wake_raised_) return;
-  wake_raised_ = true;
-  wake_.raise();
-}
-
-/// One gathered write. False: nothing waits, or the kernel takes no more.
-bool Outbound::write_once() {
-  if (no_memory_) return false;
-  try {
-    return write_gathered();
-  } catch (const std::bad_alloc&) {
-    on_no_memory();  // the sender of the message has its answer already
-    return false;
-  }
-}
-
-void Outbound::on_no_memory() {
-  broken_ = no_memory_ = true;
-  wake_library();
-}
-
-bool Outbound::write_gathered() {
+void Outbound::refill() {
   if (!held_.empty()) put_held();
   if (leaving_ && queue_.all_written() && !goodbye_.empty()) {
     frames_.append_control(goodbye_);
     goodbye_.clear();
   }
-  const auto pieces = queue_.gather();
-  net::Stream& stream = *stream_;
-  if (pieces.empty() && stream.pending_out() == 0) return false;
-  std::size_t offered = 0;
-  for (const iovec& piece : pieces) offered += piece.iov_len;
-  mutex_.unlock();
-  const net::IoResult result = stream.send(pieces);
-  mutex_.lock();
-  ++write_calls_;
-  bytes_sent_ += result.bytes;
-  queue_.commit(result.bytes);
-  if (result.bytes > 0) notify_waiting();
-  broken_ = broken_ || result.status == net::IoStatus::failed;
-  // A callback's time is not waited for: see write_or_leave().
-  full_ = !broken_ && (result.bytes < offered || stream.pending_out() != 0);
-  return !broken_ && !full_;
-}
-
-/// Also where nothing was written: detach() waits for the writer, and drain() does where the queue
-/// is empty already.
-void Outbound::end_writing() {
-  writing_ = false;
-  notify_waiting();
-}
-
-void Outbound::write_rounds(bool by_library) {
-  writing_ = true;
-  // Messages that came during the write of a burst are gathered again, after a look at the socket.
-  const int rounds_max = by_library && gather_burst() ? 1 : kWriteRoundsMax;
-  int rounds = 0;
-  // While the library's thread is in a callback nobody else would write the rest.
-  while ((rounds < rounds_max || in_callbacks_) && connection_.connected() && write_once())
-    ++rounds;
-  end_writing();
-  last_write_ns_ = steady_now_ns();
-  const bool more = rounds >= rounds_max && (!queue_.all_written() || !held_.empty());
-  // The library's thread sees for itself that the kernel is full: waking it would only make it try
-  // again at once.
-  if (more || (!by_library && (full_ || broken_))) wake_library();
 }
 
 void Outbound::write_pending(bool writable) {
   const MutexLock lock(mutex_);
-  wake_raised_ = false;
-  if (!connection_.connected() || writing_ || broken_ || (full_ && !writable)) return;
-  full_ = false;
-  write_rounds(true);
+  writer_.write_pending(writable, mutex_);
 }
 
 void Outbound::begin_callbacks() {
   const MutexLock lock(mutex_);
-  in_callbacks_ = true;
-  // Not gathered, since what is left behind one write would wait for the program.
-  if (wake_raised_ && connection_.connected() && !writing_ && !full_ && !broken_)
-    write_rounds(false);
+  writer_.begin_callbacks(mutex_);
 }
 
 void Outbound::end_callbacks() {
   const MutexLock lock(mutex_);
-  in_callbacks_ = false;
+  writer_.end_callbacks();
 }
 
 Outbound::Wants Outbound::wants() {
   const MutexLock lock(mutex_);
-  const bool idle = !writing_ && stream_ != nullptr;
-  return {full_ && !writing_, idle ? stream_->pending_out() : 0, broken_, no_memory_,
-          last_write_ns_};
+  return writer_.wants();
 }
 
 bool Outbound::post(std::span<const std::byte> frame) {
@@ -184,7 +95,7 @@ std::uint64_t Outbound::readdress(const SendQueue::GroupMap& moves) {
 void Outbound::end_declaring() {
   const MutexLock lock(mutex_);
   moves_.end();
-  notify_waiting();
+  waiters_.notify();
   write_or_leave(false);
 }
 
@@ -195,7 +106,7 @@ void Outbound::forget_moves(std::uint32_t group) {
 
 std::uint32_t Outbound::waiting() {
   const MutexLock lock(mutex_);
-  return waiting_;
+  return waiters_.count();
 }
 
 std::uint32_t Outbound::id() {
@@ -212,7 +123,7 @@ void Outbound::on_pause(const proto::flow::Target& target) {
 void Outbound::on_resume(const proto::flow::Target& target) {
   const MutexLock lock(mutex_);
   pauses_.resume(target);
-  notify_waiting();
+  waiters_.notify();
   if (!held_.empty()) write_or_leave(false);
 }
 
@@ -220,7 +131,7 @@ bool Outbound::on_confirm(std::uint64_t count) {
   const MutexLock lock(mutex_);
   const bool possible = queue_.confirm(count);
   asked_ = false;
-  notify_waiting();
+  waiters_.notify();
   if (!held_.empty()) write_or_leave(false);
   return possible;
 }
@@ -232,7 +143,7 @@ std::optional<proto::Report> Outbound::on_taken(std::uint32_t from, const proto:
     if (progress->number != taken.message || progress->dst != from || !progress->windowed) continue;
     static_cast<void>(progress->window.on_taken(taken));
     progress->refused |= taken.refuses();
-    notify_waiting();
+    waiters_.notify();
   }
   if (!held_.empty()) write_or_leave(false);
   return report;
@@ -248,7 +159,7 @@ bool Outbound::on_report(const proto::Report& report) {
     for (auto& [stream, progress] : in_progress_) {
       if (progress->windowed && progress->dst == header.dst) progress->undelivered = report.reason;
     }
-    notify_waiting();
+    waiters_.notify();
     // Others may be merged with it.
     return report.count <= 1 || !reports_wanted_;
   }
@@ -261,7 +172,7 @@ bool Outbound::on_report(const proto::Report& report) {
     const bool rest = report.reason == proto::DropReason::cut_message;
     if (!rest || progress.undelivered == proto::DropReason::none)
       progress.undelivered = report.reason;
-    notify_waiting();
+    waiters_.notify();
   }
   return !reports_wanted_;
 }
@@ -278,8 +189,8 @@ void Outbound::add_counters(nif_counters& counters) {
   counters.frames_resent = queue_.frames_resent();
   counters.frames_let_go = queue_.frames_let_go();
   counters.frames_replaced = queue_.frames_replaced();
-  counters.bytes_sent = bytes_sent_;
-  counters.write_calls = write_calls_;
+  counters.bytes_sent = writer_.bytes_sent();
+  counters.write_calls = writer_.write_calls();
   counters.pauses = pause_count_;
   counters.send_queue_bytes = queue_.unsent_bytes() + held_.bytes();
   counters.retained_bytes = queue_.retained_bytes();

@@ -21,6 +21,7 @@
 #include "client/nif/reported_messages.hpp"
 #include "client/nif/send_queue.hpp"
 #include "client/nif/session_terms.hpp"
+#include "client/nif/socket_writer.hpp"
 #include "gimnet/nif.h"
 #include "net/wait.hpp"
 #include "proto/frame/flow.hpp"
@@ -31,26 +32,21 @@
 namespace gimnet::nif {
 
 /// The sending half of a node: any thread puts messages in, whoever finds the socket idle writes
-/// what is there.
-///
-/// A message is copied into the send queue; then its thread becomes the writer, unless another one
-/// is (which takes the message along), the kernel is full, or messages come so fast one after
-/// another that writing is left to the library's thread, which gathers them. One small message on
-/// an idle connection is one system call in the caller's thread.
+/// what is there (SocketWriter).
 ///
 /// Where memory runs out inside, the call throws std::bad_alloc, and the connection ends: the
 /// library's thread begins anew with an empty queue.
 ///
 /// Thread safety: send, flush, drain, post and the counters from any thread; the rest from the
 /// library's thread.
-class Outbound {
+class Outbound final : private SocketWriter::Source {
  public:
   /// `wake` rouses the library's thread, which then calls write_pending().
   Outbound(const SendQueue::Limits& limits, net::WakeSignal& wake,
            std::size_t last_message_bytes = LastMessages::kMessageBytesDefault)
-      : wake_(wake),
-        queue_(limits),
+      : queue_(limits),
         frames_(queue_),
+        writer_({queue_, frames_.appended(), *this, connection_, waiters_, wake}),
         held_(limits.queue_bytes),
         last_(last_message_bytes) {}
 
@@ -95,14 +91,7 @@ class Outbound {
   void begin_leaving(std::uint64_t taken, std::span<const std::byte> goodbye)
       GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] bool write_last() GIMNET_EXCLUDES(mutex_);
-  /// The state of writing, by which its thread waits.
-  struct Wants {
-    bool blocked = false;         ///< the kernel was full
-    std::size_t pending_out = 0;  ///< as Stream::pending_out(); 0 while somebody writes
-    bool broken = false;          ///< a write failed
-    bool no_memory = false;       ///< because there was no memory for it
-    std::int64_t last_write_ns = 0;
-  };
+  using Wants = SocketWriter::Wants;
   [[nodiscard]] Wants wants() GIMNET_EXCLUDES(mutex_);
   /// The program's callback is called from now on, until end_callbacks(): nothing is left to the
   /// library's thread meanwhile, and what was left to it before is written now.
@@ -141,9 +130,6 @@ class Outbound {
       GIMNET_EXCLUDES(mutex_);
 
  private:
-  /// A send that follows the last write, or the send before, within this time is part of a burst.
-  static constexpr std::int64_t kQuickNs = 3'000;
-
   /// Holds the lock. Memory that runs out meanwhile leaves a queue that is not in order.
   class GIMNET_SCOPED_CAPABILITY Inside {
    public:
@@ -152,7 +138,7 @@ class Outbound {
       outbound.mutex_.lock();
     }
     ~Inside() GIMNET_RELEASE() GIMNET_NO_THREAD_SAFETY_ANALYSIS {
-      if (std::uncaught_exceptions() != exceptions_) outbound_.on_no_memory();
+      if (std::uncaught_exceptions() != exceptions_) outbound_.writer_.give_up();
       outbound_.mutex_.unlock();
     }
     Inside(const Inside&) = delete;
@@ -162,10 +148,8 @@ class Outbound {
     Outbound& outbound_;
     const int exceptions_;
   };
-  /// The one place where a connection ends for want of memory.
-  void on_no_memory() GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool usable() const GIMNET_REQUIRES(mutex_) {
-    return connection_.connected() && !no_memory_;
+    return connection_.connected() && !writer_.no_memory();
   }
   [[nodiscard]] nif_status send_whole(Outgoing& message, Deadline deadline) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status send_fragments(Outgoing& message, Deadline deadline)
@@ -188,42 +172,28 @@ class Outbound {
   [[nodiscard]] std::uint32_t number_of(Outgoing& message, bool windowed) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool is_retained(const Outgoing& message) const GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status check_retained(Outgoing& message) const GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] bool write_here() GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool ask_for_confirm() GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool may_go(const Outgoing& message, std::size_t frame_size,
                             const SendProgress* own) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool has_room(const Outgoing& message, std::size_t frame_size,
                               const SendProgress* own) GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] bool wait(Deadline deadline) GIMNET_REQUIRES(mutex_);
-  void write_or_leave(bool more) GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] bool in_burst() GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] bool gather_burst() GIMNET_REQUIRES(mutex_);
-  void write_rounds(bool by_library) GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] bool write_once() GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] bool write_gathered() GIMNET_REQUIRES(mutex_);
+  void write_or_leave(bool more) GIMNET_REQUIRES(mutex_) { writer_.write_or_leave(more, mutex_); }
+  /// Of the writer, within its own calls.
+  void refill() override GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] bool has_more() const override GIMNET_REQUIRES(mutex_) { return !held_.empty(); }
   [[nodiscard]] std::optional<std::uint64_t> take_up(const SessionTerms& session)
       GIMNET_REQUIRES(mutex_);
-  /// The kernel has all that was queued.
-  [[nodiscard]] bool all_sent() const GIMNET_REQUIRES(mutex_) {
-    return queue_.all_written() && (stream_ == nullptr || stream_->pending_out() == 0);
-  }
-  void end_writing() GIMNET_REQUIRES(mutex_);
-  void wake_library() GIMNET_REQUIRES(mutex_);
-  void notify_waiting() GIMNET_REQUIRES(mutex_);
-
-  net::WakeSignal& wake_;
-
   Mutex mutex_;
-  Condition changed_;
+  Waiters waiters_ GIMNET_GUARDED_BY(mutex_);
   ConnectionState connection_ GIMNET_GUARDED_BY(mutex_);
   std::uint64_t epochs_ GIMNET_GUARDED_BY(mutex_) = 0;  ///< grows when counts begin anew
   bool lost_ GIMNET_GUARDED_BY(mutex_) =
       false;  ///< frames were given up unconfirmed, and drain() has not said so yet
   bool asked_ GIMNET_GUARDED_BY(mutex_) =
       false;  ///< drain() asked this hub for a CONFIRM, and none came since
-  net::Stream* stream_ GIMNET_GUARDED_BY(mutex_) = nullptr;
   SendQueue queue_ GIMNET_GUARDED_BY(mutex_);
   FrameAppender frames_ GIMNET_GUARDED_BY(mutex_);  ///< of queue_
+  SocketWriter writer_ GIMNET_GUARDED_BY(mutex_);
   std::vector<std::byte> goodbye_
       GIMNET_GUARDED_BY(mutex_);  ///< waits until everything else is written
   PauseTable pauses_ GIMNET_GUARDED_BY(mutex_);
@@ -237,22 +207,9 @@ class Outbound {
   LastMessages last_ GIMNET_GUARDED_BY(mutex_);
   std::optional<std::uint32_t> hub_retains_
       GIMNET_GUARDED_BY(mutex_);  ///< SessionTerms::retained_bytes_max
-  std::uint32_t waiting_ GIMNET_GUARDED_BY(mutex_) = 0;
   GroupMoves moves_ GIMNET_GUARDED_BY(mutex_);
 
-  bool writing_ GIMNET_GUARDED_BY(mutex_) = false;  ///< somebody is between gather() and commit()
-  bool full_ GIMNET_GUARDED_BY(mutex_) = false;     ///< the kernel took less than was offered
-  bool broken_ GIMNET_GUARDED_BY(mutex_) = false;
-  bool no_memory_ GIMNET_GUARDED_BY(mutex_) =
-      false;  ///< the queue is not in order: only drop_all() is right
-  bool wake_raised_ GIMNET_GUARDED_BY(mutex_) = false;
-  bool in_callbacks_ GIMNET_GUARDED_BY(mutex_) = false;  ///< the library's thread cannot write
-  std::int64_t last_write_ns_ GIMNET_GUARDED_BY(mutex_) = 0;
-  std::uint32_t quick_sends_ GIMNET_GUARDED_BY(mutex_) = 0;
-
   std::uint64_t messages_sent_ GIMNET_GUARDED_BY(mutex_) = 0;
-  std::uint64_t bytes_sent_ GIMNET_GUARDED_BY(mutex_) = 0;
-  std::uint64_t write_calls_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::uint64_t pause_count_ GIMNET_GUARDED_BY(mutex_) = 0;
 };
 

@@ -15,7 +15,7 @@ void Outbound::put_held() {
     }
     in_progress_.erase(each->message->stream());
     each = held_.erase(each);
-    notify_waiting();
+    waiters_.notify();
   }
 }
 
@@ -44,7 +44,7 @@ void Outbound::drop_held() {
 
 void Outbound::look_after_held() {
   const Inside inside(*this);
-  if (pauses_.lift_overdue(hub_of(NodeId{frames_.id()}), steady_now_ns())) notify_waiting();
+  if (pauses_.lift_overdue(hub_of(NodeId{frames_.id()}), steady_now_ns())) waiters_.notify();
   if (!connection_.connected() || held_.empty()) return;
   for (const HeldMessage& held : held_) {
     if (held.progress.windowed && held.progress.window.room() == 0)
@@ -78,44 +78,40 @@ std::optional<std::uint64_t> Outbound::attach(net::Stream& stream, const Session
   frames_.begin_session(session.id, session.frame_bytes_max);
   hub_retains_ = session.retained_bytes_max;
   pauses_.clear();
-  stream_ = &stream;
+  writer_.attach(stream);
   asked_ = false;
-  full_ = false;
-  broken_ = false;
-  last_write_ns_ = steady_now_ns();
   if (*missing > 0) frames_.append_flow(proto::flow::Skip{proto::DropReason::link_lost, *missing});
   // A handle that is being closed stays closed: whoever waits in it leaves, and nobody else comes
   // in.
   connection_.connect();
-  changed_.notify_all();
+  waiters_.notify();
   return missing;
 }
 
 void Outbound::detach(bool again) {
   const MutexLock lock(mutex_);
   connection_.lose();
-  while (writing_) static_cast<void>(wait(kNever));
-  stream_ = nullptr;
-  full_ = false;
+  writer_.detach(mutex_);
   pauses_.clear();
+  bool in_order = !writer_.no_memory();
   try {
-    if (!no_memory_) queue_.disconnect();
+    if (in_order) queue_.disconnect();
   } catch (const std::bad_alloc&) {
-    no_memory_ = true;
+    in_order = false;
   }
-  if (!again || !queue_.resume() || no_memory_) {
-    lost_ |= no_memory_ || !queue_.all_written() || queue_.retained_bytes() > 0;
+  if (!again || !queue_.resume() || !in_order) {
+    lost_ |= !in_order || !queue_.all_written() || queue_.retained_bytes() > 0;
     static_cast<void>(queue_.drop_all());
     drop_held();
-    no_memory_ = false;
+    writer_.begin_anew();
   }
-  changed_.notify_all();
+  waiters_.notify();
 }
 
 void Outbound::end(const Failure& failure) {
   const MutexLock lock(mutex_);
   connection_.end(failure);
-  changed_.notify_all();
+  waiters_.notify();
 }
 
 void Outbound::begin_leaving(std::uint64_t taken, std::span<const std::byte> goodbye) {
@@ -129,13 +125,7 @@ void Outbound::begin_leaving(std::uint64_t taken, std::span<const std::byte> goo
 
 bool Outbound::write_last() {
   const MutexLock lock(mutex_);
-  while (writing_) static_cast<void>(wait(kNever));
-  if (stream_ == nullptr || broken_) return false;
-  writing_ = true;
-  while (write_once()) {
-  }
-  end_writing();
-  return !broken_ && !all_sent();
+  return writer_.write_last(mutex_);
 }
 
 nif_status Outbound::wait_connected(Deadline deadline) {
@@ -144,7 +134,7 @@ nif_status Outbound::wait_connected(Deadline deadline) {
     if (connection_.connected()) return NIF_OK;
     if (connection_.ended()) return connection_.not_connected();
     if (deadline != kNever && steady_now_ns() >= deadline) return connection_.not_connected();
-    static_cast<void>(wait(deadline));
+    static_cast<void>(waiters_.wait(mutex_, deadline));
   }
 }
 

@@ -2,7 +2,6 @@
 #include <array>
 #include <new>
 #include <string>
-#include <thread>
 #include <utility>
 
 #include "client/nif/outbound.hpp"
@@ -13,14 +12,6 @@
 namespace gimnet::nif {
 namespace {
 
-/// No longer than this is a burst gathered for one write.
-constexpr std::int64_t kGatherNsMax = 100'000;
-/// From one look at whether it goes on to the next.
-constexpr std::int64_t kLookNs = 1'000;
-/// With NIF_FLAG_MORE this much is written anyway.
-constexpr std::size_t kHeldBytesMax = 64 * 1024;
-/// After so many quick sends in a row gathering them pays for the wake-up of the library's thread.
-constexpr std::uint32_t kQuickSends = 4;
 /// Of a PING that asks for a CONFIRM; HubClock, which counts from 1, takes its PONG for nothing
 /// that it asked.
 constexpr std::uint32_t kAskSequence = 0;
@@ -29,62 +20,6 @@ constexpr std::uint32_t kAskSequence = 0;
 constexpr std::int64_t kProbeNs = 1'000'000'000;
 
 }  // namespace
-
-bool Outbound::in_burst() {
-  const bool quick = steady_now_ns() - last_write_ns_ < kQuickNs;
-  quick_sends_ = quick ? std::min(quick_sends_ + 1, kQuickSends) : 0;
-  return quick_sends_ == kQuickSends;
-}
-
-/// The library's thread, woken because of a burst: lets messages gather as long as they come one
-/// right after the other, so that a write takes hundreds of them along. It gives its processor to
-/// whoever wants it and does not sleep: when they stop coming they are written at once. Without it
-/// bursts of 16 B have 0.68 times the messages a second, for 1.36 times the processor time of all
-/// (median of 8 pairs, one hub, TCP, two processors). False: there is no burst, or enough of it.
-bool Outbound::gather_burst() {
-  if (quick_sends_ < kQuickSends || queue_.unsent_bytes() >= AppendedBytes::kBurst || waiting_ > 0)
-    return false;
-  const AppendedBytes& all = frames_.appended();
-  const std::uint64_t enough = all.value() + AppendedBytes::kBurst - queue_.unsent_bytes();
-  mutex_.unlock();
-  std::uint64_t appended = 0;
-  const std::int64_t begin = steady_now_ns();
-  for (std::int64_t now = begin, last = begin; now - last < kQuickNs && now - begin < kGatherNsMax;
-       now = steady_now_ns()) {
-    const std::uint64_t before = std::exchange(appended, all.value());
-    if (appended >= enough) break;
-    if (appended != before) last = now;
-    std::this_thread::yield();
-    // A look at the senders' memory slows them down, and a yield is a system call.
-    while (steady_now_ns() - now < kLookNs) {
-    }
-  }
-  mutex_.lock();
-  return true;
-}
-
-void Outbound::write_or_leave(bool more) {
-  if (!usable() || writing_ || broken_) return;
-  if (more && queue_.unsent_bytes() < kHeldBytesMax) return;
-  if (!in_callbacks_) {
-    if (full_) return;  // the library's thread waits for the kernel
-    if (wake_raised_ && quick_sends_ == kQuickSends) return;  // it comes, and takes this along
-    if (in_burst()) {
-      wake_library();
-      return;
-    }
-  }
-  write_rounds(false);
-}
-
-/// Writes in this thread if there is something to write and nobody else does. True: it tried,
-/// without the lock, so that everything may be different now.
-bool Outbound::write_here() {
-  if (!connection_.connected() || writing_ || full_ || broken_ || all_sent()) return false;
-  const std::uint64_t before = write_calls_;
-  write_rounds(false);
-  return write_calls_ != before;
-}
 
 bool Outbound::may_go(const Outgoing& message, std::size_t frame_size, const SendProgress* own) {
   return usable() && has_room(message, frame_size, own);
@@ -153,7 +88,7 @@ nif_status Outbound::wait_until_it_may_go(const Outgoing& message, std::size_t f
     if (may_go(message, frame_size, own)) return NIF_OK;
     // Messages that NIF_FLAG_MORE held back, or that were left to the library's thread, go before
     // anybody waits for room.
-    if (write_here()) continue;
+    if (writer_.write_here(mutex_)) continue;
     const std::int64_t now = steady_now_ns();
     if (now >= deadline) return connection_.no_turn();
     const bool stalled =
@@ -164,7 +99,7 @@ nif_status Outbound::wait_until_it_may_go(const Outgoing& message, std::size_t f
       write_or_leave(false);
       probe_at = now + kProbeNs;
     }
-    static_cast<void>(wait(stalled ? std::min(deadline, probe_at) : deadline));
+    static_cast<void>(waiters_.wait(mutex_, stalled ? std::min(deadline, probe_at) : deadline));
   }
 }
 
@@ -228,13 +163,13 @@ nif_status Outbound::send_fragments(Outgoing& message, Deadline deadline) {
   try {
     status = send_pieces(message, progress, deadline);
   } catch (const std::bad_alloc&) {
-    on_no_memory();
+    writer_.give_up();
     status =
         fail(NIF_NO_MEMORY, "no memory for the message; if it had begun, its receiver lost it");
   }
   const auto place = in_progress_.find(message.stream());
   if (place->second == &progress) in_progress_.erase(place);
-  notify_waiting();
+  waiters_.notify();
   return status;
 }
 
@@ -271,7 +206,7 @@ nif_status Outbound::check_retained(Outgoing& message) const {
 nif_status Outbound::flush() {
   const MutexLock lock(mutex_);
   if (!connection_.connected()) return connection_.not_connected();
-  static_cast<void>(write_here());
+  static_cast<void>(writer_.write_here(mutex_));
   return NIF_OK;
 }
 
@@ -279,8 +214,7 @@ nif_status Outbound::flush() {
 /// True: it was asked. One question at a time: the answer to an earlier one may be all that is
 /// wanted, and if not the next one follows it.
 bool Outbound::ask_for_confirm() {
-  if (!connection_.connected() || asked_ || writing_ || broken_ || !queue_.all_written())
-    return false;
+  if (asked_ || !writer_.ready() || !queue_.all_written()) return false;
   frames_.append_flow(proto::flow::Ping{kAskSequence, wall_now_ns()});
   asked_ = true;
   write_or_leave(false);
@@ -298,13 +232,13 @@ nif_status Outbound::drain(Deadline deadline) {
                   "the connection was lost before everything was confirmed; some of it may not "
                   "have arrived");
     }
-    const bool nothing_waits = all_sent() && held_.empty() && !writing_;
+    const bool nothing_waits = writer_.all_sent() && held_.empty() && !writer_.writing();
     if (nothing_waits && queue_.retained_bytes() == 0) return NIF_OK;
-    if (write_here() || ask_for_confirm()) continue;
+    if (writer_.write_here(mutex_) || ask_for_confirm()) continue;
     if (deadline != kNever && steady_now_ns() >= deadline) {
       return fail(NIF_TIMEOUT, "not everything was written and confirmed within the time given");
     }
-    static_cast<void>(wait(deadline));
+    static_cast<void>(waiters_.wait(mutex_, deadline));
   }
 }
 
