@@ -24,6 +24,8 @@ struct SendProgress {
   proto::DropReason undelivered = proto::DropReason::none;
   proto::SendWindow window{0, 0};
 
+  /// The receiver allows no more at the moment.
+  [[nodiscard]] bool stalled() const { return windowed && window.room() == 0; }
   /// It has begun, and cannot be finished any more.
   [[nodiscard]] bool lost(std::uint64_t epoch_now) const {
     return refused || undelivered != proto::DropReason::none || (number != 0 && epoch != epoch_now);
@@ -60,6 +62,8 @@ class HeldMessages {
   using Place = Messages::iterator;
   [[nodiscard]] Place begin() { return messages_.begin(); }
   [[nodiscard]] Place end() { return messages_.end(); }
+  [[nodiscard]] Messages::const_iterator begin() const { return messages_.begin(); }
+  [[nodiscard]] Messages::const_iterator end() const { return messages_.end(); }
   /// The one behind it.
   Place erase(Place place);
   void clear();

@@ -4,7 +4,11 @@
 
 namespace gimnet::nif {
 void Outbound::refill() {
-  if (!held_.empty()) put_held();
+  if (under_way_.holds_any() && (connection_.connected() || leaving_)) {
+    const MessagesUnderWay::Put put = under_way_.put_held(gate_, frames_);
+    lost_ |= put.lost;
+    if (put.ended) waiters_.notify();
+  }
   if (leaving_ && queue_.all_written() && !goodbye_.empty()) {
     frames_.append_control(goodbye_);
     goodbye_.clear();
@@ -69,12 +73,7 @@ void Outbound::send_last_again(const std::string& service) {
   const Inside inside(*this);
   const LastMessage* const last = last_.find(service);
   if (last == nullptr || !usable()) return;
-  const proto::FrameHeader& header = last->header;
-  const auto newer = in_progress_.find(stream_code(header.kind, header.lane, header.dst));
-  if (newer != in_progress_.end() && newer->second->number != 0 &&
-      newer->second->epoch == epochs_) {
-    return;  // it goes on, and is about to be the last one
-  }
+  if (under_way_.goes_on(last->header)) return;  // a newer one, which is about to be the last
   frames_.append_last(*last);
   write_or_leave(false);
 }
@@ -124,7 +123,7 @@ void Outbound::on_resume(const proto::flow::Target& target) {
   const MutexLock lock(mutex_);
   pauses_.resume(target);
   waiters_.notify();
-  if (!held_.empty()) write_or_leave(false);
+  write_held();
 }
 
 bool Outbound::on_confirm(std::uint64_t count) {
@@ -132,48 +131,26 @@ bool Outbound::on_confirm(std::uint64_t count) {
   const bool possible = queue_.confirm(count);
   asked_ = false;
   waiters_.notify();
-  if (!held_.empty()) write_or_leave(false);
+  write_held();
   return possible;
 }
 
 std::optional<proto::Report> Outbound::on_taken(std::uint32_t from, const proto::Taken& taken) {
   const MutexLock lock(mutex_);
-  const auto report = held_.empty() ? std::nullopt : held_.report_of(from, taken);
-  for (auto& [stream, progress] : in_progress_) {
-    if (progress->number != taken.message || progress->dst != from || !progress->windowed) continue;
-    static_cast<void>(progress->window.on_taken(taken));
-    progress->refused |= taken.refuses();
-    waiters_.notify();
-  }
-  if (!held_.empty()) write_or_leave(false);
+  const auto report = under_way_.on_taken(from, taken);
+  waiters_.notify();
+  write_held();
   return report;
 }
 
 bool Outbound::on_report(const proto::Report& report) {
   const MutexLock lock(mutex_);
-  const proto::FrameHeader& header = report.header;
   // About a service, and not about a message that was lost: the program did not have to ask.
   if (report.reason == proto::DropReason::not_retained) return false;
-  if (header.kind == proto::Kind::taken) {
-    // Our own TAKENs ask for no reports, so this answers probe().
-    for (auto& [stream, progress] : in_progress_) {
-      if (progress->windowed && progress->dst == header.dst) progress->undelivered = report.reason;
-    }
-    waiters_.notify();
-    // Others may be merged with it.
-    return report.count <= 1 || !reports_wanted_;
-  }
-  const auto found = in_progress_.find(stream_code(header.kind, header.lane, header.dst));
-  const auto number = ReportedMessages::number_of(report);
-  if (found != in_progress_.end() && found->second->windowed && header.has(proto::kFlagFragment) &&
-      (!number || *number == found->second->number)) {
-    SendProgress& progress = *found->second;
-    // Why the rest of a message goes is what became of its beginning.
-    const bool rest = report.reason == proto::DropReason::cut_message;
-    if (!rest || progress.undelivered == proto::DropReason::none)
-      progress.undelivered = report.reason;
-    waiters_.notify();
-  }
+  under_way_.on_report(report);
+  waiters_.notify();
+  // An answer to a question of the library, unless others are merged with it.
+  if (report.header.kind == proto::Kind::taken && report.count <= 1) return true;
   return !reports_wanted_;
 }
 
@@ -192,7 +169,7 @@ void Outbound::add_counters(nif_counters& counters) {
   counters.bytes_sent = writer_.bytes_sent();
   counters.write_calls = writer_.write_calls();
   counters.pauses = pause_count_;
-  counters.send_queue_bytes = queue_.unsent_bytes() + held_.bytes();
+  counters.send_queue_bytes = queue_.unsent_bytes() + under_way_.held_bytes();
   counters.retained_bytes = queue_.retained_bytes();
   counters.last_messages_not_kept = last_.not_kept();
 }

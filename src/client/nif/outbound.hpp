@@ -6,7 +6,6 @@
 #include <optional>
 #include <span>
 #include <string>
-#include <unordered_map>
 #include <vector>
 
 #include "base/mutex.hpp"
@@ -14,11 +13,12 @@
 #include "client/nif/error.hpp"
 #include "client/nif/frame_appender.hpp"
 #include "client/nif/group_moves.hpp"
-#include "client/nif/held_messages.hpp"
 #include "client/nif/last_messages.hpp"
+#include "client/nif/messages_under_way.hpp"
 #include "client/nif/outgoing.hpp"
 #include "client/nif/pause_table.hpp"
 #include "client/nif/reported_messages.hpp"
+#include "client/nif/send_gate.hpp"
 #include "client/nif/send_queue.hpp"
 #include "client/nif/session_terms.hpp"
 #include "client/nif/socket_writer.hpp"
@@ -47,7 +47,8 @@ class Outbound final : private SocketWriter::Source {
       : queue_(limits),
         frames_(queue_),
         writer_({queue_, frames_.appended(), *this, connection_, waiters_, wake}),
-        held_(limits.queue_bytes),
+        gate_(pauses_, moves_, queue_),
+        under_way_(limits.queue_bytes),
         last_(last_message_bytes) {}
 
   // Any thread.
@@ -156,37 +157,34 @@ class Outbound final : private SocketWriter::Source {
       GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status send_pieces(Outgoing& message, SendProgress& progress, Deadline deadline)
       GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] nif_status hold_rest(Outgoing& message, const SendProgress& progress,
-                                     const proto::Fragmenter& fragmenter) GIMNET_REQUIRES(mutex_);
-  /// Puts into the queue what may go of the messages that are held.
-  void put_held() GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] bool put_held(HeldMessage& held) GIMNET_REQUIRES(mutex_);
-  void drop_held() GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status wait_for_turn(Outgoing& message, std::size_t frame_size,
                                          const SendProgress* own, Deadline deadline)
       GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status wait_until_it_may_go(const Outgoing& message, std::size_t frame_size,
                                                 const SendProgress* own, Deadline deadline)
       GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] nif_status check_progress(const SendProgress& own) const GIMNET_REQUIRES(mutex_);
   [[nodiscard]] std::uint32_t number_of(Outgoing& message, bool windowed) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool is_retained(const Outgoing& message) const GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status check_retained(Outgoing& message) const GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool ask_for_confirm() GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool may_go(const Outgoing& message, std::size_t frame_size,
                             const SendProgress* own) GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] bool has_room(const Outgoing& message, std::size_t frame_size,
-                              const SendProgress* own) GIMNET_REQUIRES(mutex_);
   void write_or_leave(bool more) GIMNET_REQUIRES(mutex_) { writer_.write_or_leave(more, mutex_); }
   /// Of the writer, within its own calls.
   void refill() override GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] bool has_more() const override GIMNET_REQUIRES(mutex_) { return !held_.empty(); }
+  [[nodiscard]] bool has_more() const override GIMNET_REQUIRES(mutex_) {
+    return under_way_.holds_any();
+  }
+  /// More may go of the messages that are held.
+  void write_held() GIMNET_REQUIRES(mutex_) {
+    if (under_way_.holds_any()) write_or_leave(false);
+  }
+
   [[nodiscard]] std::optional<std::uint64_t> take_up(const SessionTerms& session)
       GIMNET_REQUIRES(mutex_);
   Mutex mutex_;
   Waiters waiters_ GIMNET_GUARDED_BY(mutex_);
   ConnectionState connection_ GIMNET_GUARDED_BY(mutex_);
-  std::uint64_t epochs_ GIMNET_GUARDED_BY(mutex_) = 0;  ///< grows when counts begin anew
   bool lost_ GIMNET_GUARDED_BY(mutex_) =
       false;  ///< frames were given up unconfirmed, and drain() has not said so yet
   bool asked_ GIMNET_GUARDED_BY(mutex_) =
@@ -197,9 +195,9 @@ class Outbound final : private SocketWriter::Source {
   std::vector<std::byte> goodbye_
       GIMNET_GUARDED_BY(mutex_);  ///< waits until everything else is written
   PauseTable pauses_ GIMNET_GUARDED_BY(mutex_);
-  std::unordered_map<std::uint64_t, SendProgress*> in_progress_
-      GIMNET_GUARDED_BY(mutex_);  ///< by stream
-  HeldMessages held_ GIMNET_GUARDED_BY(mutex_);
+  GroupMoves moves_ GIMNET_GUARDED_BY(mutex_);
+  SendGate gate_ GIMNET_GUARDED_BY(mutex_);
+  MessagesUnderWay under_way_ GIMNET_GUARDED_BY(mutex_);
   bool leaving_ GIMNET_GUARDED_BY(mutex_) = false;  ///< what waits is the last that goes
   ReportedMessages reported_ GIMNET_GUARDED_BY(mutex_);
   bool reports_wanted_ GIMNET_GUARDED_BY(mutex_) =
@@ -207,7 +205,6 @@ class Outbound final : private SocketWriter::Source {
   LastMessages last_ GIMNET_GUARDED_BY(mutex_);
   std::optional<std::uint32_t> hub_retains_
       GIMNET_GUARDED_BY(mutex_);  ///< SessionTerms::retained_bytes_max
-  GroupMoves moves_ GIMNET_GUARDED_BY(mutex_);
 
   std::uint64_t messages_sent_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::uint64_t pause_count_ GIMNET_GUARDED_BY(mutex_) = 0;

@@ -6,50 +6,11 @@
 
 namespace gimnet::nif {
 
-void Outbound::put_held() {
-  if (!connection_.connected() && !leaving_) return;
-  for (auto each = held_.begin(); each != held_.end();) {
-    if (!put_held(*each)) {
-      ++each;
-      continue;
-    }
-    in_progress_.erase(each->message->stream());
-    each = held_.erase(each);
-    waiters_.notify();
-  }
-}
-
-/// True: nothing of it is left, or it is lost.
-bool Outbound::put_held(HeldMessage& held) {
-  Outgoing& message = *held.message;
-  const std::size_t frame = FrameAppender::frame_size(message, true, frames_.piece_max(message));
-  while (!held.fragmenter.done()) {
-    if (held.progress.lost(epochs_)) return true;
-    if (!has_room(message, frame, &held.progress)) return false;
-    if (message.is_group() && moves_.refuses(message.parts().header.dst)) {
-      lost_ = true;
-      return true;
-    }
-    frames_.append_piece(message, held.progress, held.fragmenter);
-  }
-  return true;
-}
-
-/// Their counts have begun anew, or no connection will come.
-void Outbound::drop_held() {
-  lost_ |= !held_.empty();
-  for (const HeldMessage& held : held_) in_progress_.erase(held.message->stream());
-  held_.clear();
-}
-
 void Outbound::look_after_held() {
   const Inside inside(*this);
   if (pauses_.lift_overdue(hub_of(NodeId{frames_.id()}), steady_now_ns())) waiters_.notify();
-  if (!connection_.connected() || held_.empty()) return;
-  for (const HeldMessage& held : held_) {
-    if (held.progress.windowed && held.progress.window.room() == 0)
-      frames_.append_probe(held.progress.dst);
-  }
+  if (!connection_.connected() || !under_way_.holds_any()) return;
+  under_way_.ask_for_receivers(frames_);
   write_or_leave(false);
 }
 
@@ -64,8 +25,7 @@ std::optional<std::uint64_t> Outbound::take_up(const SessionTerms& session) {
   } else {
     lost_ |= queue_.retained_bytes() > 0;
     queue_.restart(session.id);
-    ++epochs_;
-    drop_held();
+    lost_ |= under_way_.begin_epoch();
   }
   queue_.set_resume(session.resume);
   return missing;
@@ -102,7 +62,7 @@ void Outbound::detach(bool again) {
   if (!again || !queue_.resume() || !in_order) {
     lost_ |= !in_order || !queue_.all_written() || queue_.retained_bytes() > 0;
     static_cast<void>(queue_.drop_all());
-    drop_held();
+    lost_ |= under_way_.drop_held();
     writer_.begin_anew();
   }
   waiters_.notify();

@@ -22,43 +22,9 @@ constexpr std::int64_t kProbeNs = 1'000'000'000;
 }  // namespace
 
 bool Outbound::may_go(const Outgoing& message, std::size_t frame_size, const SendProgress* own) {
-  return usable() && has_room(message, frame_size, own);
-}
-
-bool Outbound::has_room(const Outgoing& message, std::size_t frame_size, const SendProgress* own) {
-  if (pauses_.is_paused(message.stream())) return false;
-  if (own != nullptr) {
-    if (own->windowed && own->window.room() == 0) return false;
-  } else {
-    if (!in_progress_.empty() && in_progress_.contains(message.stream())) return false;
-    const bool may_be_held = !message.patient() && message.size() > proto::kUncutMessageMax;
-    if (may_be_held && !held_.has_place(message.size())) return false;
-  }
-  if (message.is_group() && !moves_.settled()) return false;
-  if (message.replaceable() &&
-      queue_.would_replace(latest_stream_of(message.parts().header, message.parts().key))) {
-    return true;
-  }
-  return queue_.has_room(frame_size);
-}
-
-/// Why a message that has begun cannot be finished; NIF_OK: it can.
-nif_status Outbound::check_progress(const SendProgress& own) const {
-  if (own.undelivered != proto::DropReason::none) {
-    return fail(NIF_NOT_DELIVERED, std::string("the hub reported ") +
-                                       proto::drop_reason_name(own.undelivered) +
-                                       " while the message was being sent");
-  }
-  if (own.refused && own.window.taken() == 0) {
-    return fail(NIF_TOO_LARGE, "the receiver refused the message: it is larger than it takes");
-  }
-  if (own.refused)
-    return fail(NIF_NOT_DELIVERED, "the receiver lost a part of the message and gave it up");
-  if (own.number != 0 && own.epoch != epochs_) {
-    return fail(NIF_NOT_CONNECTED,
-                "the connection broke in the middle of the message; its receiver lost it");
-  }
-  return NIF_OK;
+  if (!usable()) return false;
+  if (own != nullptr ? own->stalled() : !under_way_.may_begin(message)) return false;
+  return gate_.lets_in(message, frame_size);
 }
 
 /// Waits until a frame of the message may enter the queue. `own`: the message is under way already.
@@ -78,10 +44,10 @@ nif_status Outbound::wait_until_it_may_go(const Outgoing& message, std::size_t f
     const bool waits = queue_.resume() && (own != nullptr || !message.not_while_away());
     if (connection_.ended() || (connection_.away() && !waits)) return connection_.not_connected();
     if (own != nullptr) {
-      if (const nif_status status = check_progress(*own); status != NIF_OK) return status;
+      if (const nif_status status = under_way_.check(*own); status != NIF_OK) return status;
     }
     const bool settled = connection_.connected() && moves_.settled();
-    if (settled && message.is_group() && moves_.refuses(message.parts().header.dst)) {
+    if (settled && gate_.refuses(message)) {
       return fail(NIF_REFUSED,
                   "the hub did not take the service again, after a break or another name");
     }
@@ -91,8 +57,7 @@ nif_status Outbound::wait_until_it_may_go(const Outgoing& message, std::size_t f
     if (writer_.write_here(mutex_)) continue;
     const std::int64_t now = steady_now_ns();
     if (now >= deadline) return connection_.no_turn();
-    const bool stalled =
-        own != nullptr && own->windowed && own->window.room() == 0 && connection_.connected();
+    const bool stalled = own != nullptr && own->stalled() && connection_.connected();
     if (stalled && probe_at == 0) probe_at = now + kProbeNs;
     if (stalled && now >= probe_at) {
       frames_.append_probe(own->dst);
@@ -127,25 +92,16 @@ nif_status Outbound::send_pieces(Outgoing& message, SendProgress& progress, Dead
   proto::Fragmenter fragmenter(message.size(), largest);
   while (!fragmenter.done()) {
     const nif_status turn = wait_for_turn(message, frame, &progress, deadline);
-    if (turn == NIF_TIMEOUT && progress.number != 0)
-      return hold_rest(message, progress, fragmenter);
-    if (turn != NIF_OK) return turn;
-    if (progress.number == 0) {
-      progress.number = number_of(message, progress.windowed);
-      progress.epoch = epochs_;
-      progress.window = proto::SendWindow(progress.number, message.size());
+    if (turn == NIF_TIMEOUT && progress.number != 0) {
+      under_way_.hold(message, progress, fragmenter);
+      return NIF_OK;
     }
+    if (turn != NIF_OK) return turn;
+    if (progress.number == 0)
+      under_way_.begin(message, progress, number_of(message, progress.windowed));
     frames_.append_piece(message, progress, fragmenter);
     write_or_leave(!fragmenter.done() || message.more());
   }
-  return NIF_OK;
-}
-
-/// The sender's time is over, and the message goes on without it.
-nif_status Outbound::hold_rest(Outgoing& message, const SendProgress& progress,
-                               const proto::Fragmenter& fragmenter) {
-  HeldMessage& held = held_.hold(message, progress, fragmenter);
-  in_progress_[message.stream()] = &held.progress;
   return NIF_OK;
 }
 
@@ -158,7 +114,7 @@ nif_status Outbound::send_fragments(Outgoing& message, Deadline deadline) {
                         .windowed = message.parts().header.kind == proto::Kind::unicast &&
                                     message.size() > proto::kWindowDefault,
                         .window = proto::SendWindow(0, message.size())};
-  in_progress_.emplace(message.stream(), &progress);
+  under_way_.add(message, progress);
   nif_status status = NIF_NO_MEMORY;
   try {
     status = send_pieces(message, progress, deadline);
@@ -167,8 +123,7 @@ nif_status Outbound::send_fragments(Outgoing& message, Deadline deadline) {
     status =
         fail(NIF_NO_MEMORY, "no memory for the message; if it had begun, its receiver lost it");
   }
-  const auto place = in_progress_.find(message.stream());
-  if (place->second == &progress) in_progress_.erase(place);
+  under_way_.end(message, progress);
   waiters_.notify();
   return status;
 }
@@ -232,7 +187,7 @@ nif_status Outbound::drain(Deadline deadline) {
                   "the connection was lost before everything was confirmed; some of it may not "
                   "have arrived");
     }
-    const bool nothing_waits = writer_.all_sent() && held_.empty() && !writer_.writing();
+    const bool nothing_waits = writer_.all_sent() && !under_way_.holds_any() && !writer_.writing();
     if (nothing_waits && queue_.retained_bytes() == 0) return NIF_OK;
     if (writer_.write_here(mutex_) || ask_for_confirm()) continue;
     if (deadline != kNever && steady_now_ns() >= deadline) {
