@@ -6,8 +6,6 @@ from tree import CPP_SUFFIXES, HEADER_SUFFIXES
 
 SMALL_HEADER_LINES = 40
 SMALL_HEADER_USERS = 3
-# Older than the rule; the list may only shrink.
-SLICED_CLASSES = ("Outbound",)
 
 # In formatted code a type of a namespace begins its line. The head ends at "{"; at ";" it only declares.
 _TYPE = re.compile(r"^(?:template <[^{;]*>\s+)?(?:class|struct|union|enum(?: class)?) "
@@ -57,7 +55,5 @@ def class_in_one_source(tree):
             name = re.sub(r"<[^<>]*>", "", match[1])[:-2]
             sources.setdefault(name, {}).setdefault(file.path.rsplit(".", 1)[0], file.path)
     for name, found in sources.items():
-        if len(found) > 1 and name not in SLICED_CLASSES:
+        if len(found) > 1:
             yield f"{name} has its functions in {' and '.join(found.values())}: find the second class in it"
-        if len(found) == 1 and name in SLICED_CLASSES:
-            yield f"{next(iter(found.values()))}: {name} is whole: take it off SLICED_CLASSES"

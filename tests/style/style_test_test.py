@@ -237,7 +237,6 @@ CASES = {
             {"src/a.cpp": "void A::f() {\n}\n", "src/a_b.cpp": "void A::B::f() {\n}\n\nvoid C::f() {\n}\n"},
             {"src/a.cpp": "void A::f() {\n}\n", "src/b.cpp": "A b = A::c();\nvoid f() {\n  A::f();\n}\n\nA::B g() {\n}\n"},
             {"src/a.cpp": "a::B c::d() {\n}\n", "src/b.cpp": "a::B c::e() {\n}\n// void A::f() {\n"},
-            {"src/outbound.cpp": "void Outbound::f() {\n}\n", "src/outbound_send.cpp": "void Outbound::g() {\n}\n"},
         ],
         [
             {"src/a.cpp": "A::A() {\n}\n", "src/b.cpp": "int A::f(int b) const {\n}\n"},
@@ -245,7 +244,6 @@ CASES = {
             {"src/a.cpp": "bool A::operator==(int b) const {\n}\n", "src/b.c": "A::operator bool() {\n}\n"},
             {"src/a.hpp": "template <class T>\nvoid A<T>::f() {\n}\n", "src/a_g.hpp": "inline b::A& b::A::g() {\n}\n\nvoid A::h() {\n}\n"},
             {"src/a.cpp": "void A::B::f() {\n}\n", "src/b.cpp": "void A::B::g() {\n}\n"},
-            {"src/outbound.cpp": "void Outbound::f() {\n}\n"},
         ],
     ),
     rules.tests_mirror_sources: (

@@ -34,13 +34,6 @@ void FrameAppender::append_frame(std::span<const std::byte> frame) {
   appended_.add_urgent();
 }
 
-std::span<std::byte> FrameAppender::memory_for(const proto::FrameHeader& header,
-                                               std::optional<std::uint64_t> key, bool replaceable,
-                                               std::size_t bytes) {
-  return replaceable ? queue_.append_latest(header.lane, bytes, latest_stream_of(header, key))
-                     : queue_.append(header.lane, bytes);
-}
-
 void FrameAppender::put(Outgoing& message, std::optional<proto::FragmentHeader> fragment,
                         std::uint32_t offset, std::uint32_t size, bool report) {
   const std::size_t bytes = frame_size(message, fragment.has_value(), size);
@@ -51,12 +44,6 @@ void FrameAppender::put(Outgoing& message, std::optional<proto::FragmentHeader> 
     appended_.add_urgent();
   else
     appended_.add(bytes);
-}
-
-void FrameAppender::append_whole(Outgoing& message, std::optional<std::uint32_t> number) {
-  std::optional<proto::FragmentHeader> fragment;
-  if (number) fragment = proto::FragmentHeader{*number, 0, message.size()};
-  put(message, fragment, 0, message.size(), false);
 }
 
 /// Payload bytes of the largest frame with a prefix of that size.

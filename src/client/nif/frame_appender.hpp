@@ -67,7 +67,11 @@ class FrameAppender {
            payload;
   }
   /// A message in one frame; with its number if it has a fragment header.
-  void append_whole(Outgoing& message, std::optional<std::uint32_t> number);
+  void append_whole(Outgoing& message, std::optional<std::uint32_t> number) {
+    std::optional<proto::FragmentHeader> fragment;
+    if (number) fragment = proto::FragmentHeader{*number, 0, message.size()};
+    put(message, fragment, 0, message.size(), false);
+  }
   /// Payload bytes of the largest fragment of the message.
   [[nodiscard]] std::uint32_t piece_max(const Outgoing& message) const;
   /// The next fragment. REQUIRES: the message has a number, the window of `progress` has room, the
@@ -86,8 +90,11 @@ class FrameAppender {
   [[nodiscard]] std::uint32_t room_behind(std::size_t prefix_size) const;
   void put_piece(const LastMessage& last, const proto::FrameParts& parts, std::uint32_t offset);
   [[nodiscard]] std::span<std::byte> memory_for(const proto::FrameHeader& header,
-                                                std::optional<std::uint64_t> key, bool replaceable,
-                                                std::size_t bytes);
+                                                const std::optional<std::uint64_t>& key,
+                                                bool replaceable, std::size_t bytes) {
+    return replaceable ? queue_.append_latest(header.lane, bytes, latest_stream_of(header, key))
+                       : queue_.append(header.lane, bytes);
+  }
 
   SendQueue& queue_;
   std::uint32_t id_ = 0;

@@ -19,8 +19,7 @@ void GroupMoves::forget(std::uint32_t group) {
   std::erase_if(moves_, [group](const auto& entry) { return entry.second == group; });
 }
 
-void GroupMoves::redirect(Outgoing& message) const {
-  if (moves_.empty() || !message.is_group()) return;
+void GroupMoves::redirect_group(Outgoing& message) const {
   const auto moved = moves_.find(message.parts().header.dst);
   if (moved != moves_.end() && moved->second != 0) message.redirect(moved->second);
 }

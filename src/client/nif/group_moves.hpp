@@ -25,11 +25,15 @@ class GroupMoves {
   /// An own service has that group from now on, or had it until now.
   void forget(std::uint32_t group);
   /// A message to a former group goes to the one that its service has now.
-  void redirect(Outgoing& message) const;
+  void redirect(Outgoing& message) const {
+    if (!moves_.empty() && message.is_group()) redirect_group(message);
+  }
   /// The hub refuses the service whose group that is or was.
   [[nodiscard]] bool refuses(std::uint32_t group) const;
 
  private:
+  void redirect_group(Outgoing& message) const;
+
   bool settled_ = true;
   SendQueue::GroupMap moves_;  ///< by former groups; 0: refused
 };

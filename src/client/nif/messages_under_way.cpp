@@ -8,12 +8,6 @@
 
 namespace gimnet::nif {
 
-bool MessagesUnderWay::may_begin(const Outgoing& message) const {
-  if (!by_stream_.empty() && by_stream_.contains(message.stream())) return false;
-  const bool may_be_held = !message.patient() && message.size() > proto::kUncutMessageMax;
-  return !may_be_held || held_.has_place(message.size());
-}
-
 void MessagesUnderWay::begin(const Outgoing& message, SendProgress& progress,
                              std::uint32_t number) const {
   progress.number = number;

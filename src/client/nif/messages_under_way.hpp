@@ -26,7 +26,11 @@ class MessagesUnderWay {
 
   /// No other message of its stream is under way, and there is place for its rest if that may be
   /// held.
-  [[nodiscard]] bool may_begin(const Outgoing& message) const;
+  [[nodiscard]] bool may_begin(const Outgoing& message) const {
+    if (!by_stream_.empty() && by_stream_.contains(message.stream())) return false;
+    const bool may_be_held = !message.patient() && message.size() > proto::kUncutMessageMax;
+    return !may_be_held || held_.has_place(message.size());
+  }
   /// From now on until end() the message is under way. The progress stays where it is. May throw
   /// std::bad_alloc. REQUIRES: may_begin().
   void add(const Outgoing& message, SendProgress& progress) {

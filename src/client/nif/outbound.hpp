@@ -14,6 +14,7 @@
 #include "client/nif/frame_appender.hpp"
 #include "client/nif/group_moves.hpp"
 #include "client/nif/last_messages.hpp"
+#include "client/nif/message_sender.hpp"
 #include "client/nif/messages_under_way.hpp"
 #include "client/nif/outgoing.hpp"
 #include "client/nif/pause_table.hpp"
@@ -49,7 +50,8 @@ class Outbound final : private SocketWriter::Source {
         writer_({queue_, frames_.appended(), *this, connection_, waiters_, wake}),
         gate_(pauses_, moves_, queue_),
         under_way_(limits.queue_bytes),
-        last_(last_message_bytes) {}
+        last_(last_message_bytes),
+        sender_({connection_, queue_, gate_, frames_, under_way_, writer_, waiters_, last_}) {}
 
   // Any thread.
   [[nodiscard]] nif_status send(Outgoing& message, Deadline deadline) GIMNET_EXCLUDES(mutex_);
@@ -149,27 +151,7 @@ class Outbound final : private SocketWriter::Source {
     Outbound& outbound_;
     const int exceptions_;
   };
-  [[nodiscard]] bool usable() const GIMNET_REQUIRES(mutex_) {
-    return connection_.connected() && !writer_.no_memory();
-  }
-  [[nodiscard]] nif_status send_whole(Outgoing& message, Deadline deadline) GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] nif_status send_fragments(Outgoing& message, Deadline deadline)
-      GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] nif_status send_pieces(Outgoing& message, SendProgress& progress, Deadline deadline)
-      GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] nif_status wait_for_turn(Outgoing& message, std::size_t frame_size,
-                                         const SendProgress* own, Deadline deadline)
-      GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] nif_status wait_until_it_may_go(const Outgoing& message, std::size_t frame_size,
-                                                const SendProgress* own, Deadline deadline)
-      GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] std::uint32_t number_of(Outgoing& message, bool windowed) GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] bool is_retained(const Outgoing& message) const GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] nif_status check_retained(Outgoing& message) const GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] bool ask_for_confirm() GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] bool may_go(const Outgoing& message, std::size_t frame_size,
-                            const SendProgress* own) GIMNET_REQUIRES(mutex_);
-  void write_or_leave(bool more) GIMNET_REQUIRES(mutex_) { writer_.write_or_leave(more, mutex_); }
+  void write_or_leave() GIMNET_REQUIRES(mutex_) { writer_.write_or_leave(false, mutex_); }
   /// Of the writer, within its own calls.
   void refill() override GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool has_more() const override GIMNET_REQUIRES(mutex_) {
@@ -177,36 +159,32 @@ class Outbound final : private SocketWriter::Source {
   }
   /// More may go of the messages that are held.
   void write_held() GIMNET_REQUIRES(mutex_) {
-    if (under_way_.holds_any()) write_or_leave(false);
+    if (under_way_.holds_any()) write_or_leave();
   }
-
+  [[nodiscard]] bool ask_for_confirm() GIMNET_REQUIRES(mutex_);
   [[nodiscard]] std::optional<std::uint64_t> take_up(const SessionTerms& session)
       GIMNET_REQUIRES(mutex_);
+
   Mutex mutex_;
   Waiters waiters_ GIMNET_GUARDED_BY(mutex_);
   ConnectionState connection_ GIMNET_GUARDED_BY(mutex_);
-  bool lost_ GIMNET_GUARDED_BY(mutex_) =
-      false;  ///< frames were given up unconfirmed, and drain() has not said so yet
-  bool asked_ GIMNET_GUARDED_BY(mutex_) =
-      false;  ///< drain() asked this hub for a CONFIRM, and none came since
   SendQueue queue_ GIMNET_GUARDED_BY(mutex_);
-  FrameAppender frames_ GIMNET_GUARDED_BY(mutex_);  ///< of queue_
+  FrameAppender frames_ GIMNET_GUARDED_BY(mutex_);
   SocketWriter writer_ GIMNET_GUARDED_BY(mutex_);
-  std::vector<std::byte> goodbye_
-      GIMNET_GUARDED_BY(mutex_);  ///< waits until everything else is written
   PauseTable pauses_ GIMNET_GUARDED_BY(mutex_);
   GroupMoves moves_ GIMNET_GUARDED_BY(mutex_);
   SendGate gate_ GIMNET_GUARDED_BY(mutex_);
   MessagesUnderWay under_way_ GIMNET_GUARDED_BY(mutex_);
-  bool leaving_ GIMNET_GUARDED_BY(mutex_) = false;  ///< what waits is the last that goes
-  ReportedMessages reported_ GIMNET_GUARDED_BY(mutex_);
-  bool reports_wanted_ GIMNET_GUARDED_BY(mutex_) =
-      false;  ///< the program sent something with NIF_FLAG_REPORT
   LastMessages last_ GIMNET_GUARDED_BY(mutex_);
-  std::optional<std::uint32_t> hub_retains_
-      GIMNET_GUARDED_BY(mutex_);  ///< SessionTerms::retained_bytes_max
+  MessageSender sender_ GIMNET_GUARDED_BY(mutex_);
 
-  std::uint64_t messages_sent_ GIMNET_GUARDED_BY(mutex_) = 0;
+  bool lost_ GIMNET_GUARDED_BY(mutex_) =
+      false;  ///< frames were given up unconfirmed, and drain() has not said so yet
+  bool asked_ GIMNET_GUARDED_BY(mutex_) =
+      false;  ///< drain() asked this hub for a CONFIRM, and none came since
+  bool leaving_ GIMNET_GUARDED_BY(mutex_) = false;  ///< what waits is the last that goes
+  std::vector<std::byte> goodbye_
+      GIMNET_GUARDED_BY(mutex_);  ///< waits until everything else is written
   std::uint64_t pause_count_ GIMNET_GUARDED_BY(mutex_) = 0;
 };
 

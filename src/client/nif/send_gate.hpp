@@ -27,10 +27,12 @@ class SendGate {
     }
     return queue_.has_room(frame_size);
   }
-  /// The hub does not take the service of the message.
+  /// The hub does not take the service of the message, as far as that is settled.
   [[nodiscard]] bool refuses(const Outgoing& message) const {
-    return message.is_group() && moves_.refuses(message.parts().header.dst);
+    return message.is_group() && moves_.settled() && moves_.refuses(message.parts().header.dst);
   }
+  /// A message to a former group goes to the one that its service has now.
+  void redirect(Outgoing& message) const { moves_.redirect(message); }
 
  private:
   const PauseTable& pauses_;

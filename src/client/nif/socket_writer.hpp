@@ -97,6 +97,8 @@ class SocketWriter {
   [[nodiscard]] bool no_memory() const { return no_memory_; }
   void begin_anew() { no_memory_ = false; }
 
+  /// Frames may be put into the queue.
+  [[nodiscard]] bool usable() const { return parts_.connection.connected() && !no_memory_; }
   /// Somebody is in a write, or gathers for one.
   [[nodiscard]] bool writing() const { return writing_; }
   /// write_or_leave() would write, as far as the kernel has room.

@@ -61,6 +61,8 @@ TEST(SendGate, RefusesTheServicesThatTheHubRefuses) {
   EXPECT_TRUE(at.gate.refuses(message_to(kGroup, NIF_GROUP)));
   EXPECT_FALSE(at.gate.refuses(message_to(12, NIF_GROUP)));
   EXPECT_FALSE(at.gate.refuses(message_to(kGroup))) << "a node";
+  at.moves.begin();
+  EXPECT_FALSE(at.gate.refuses(message_to(kGroup, NIF_GROUP))) << "it may take it this time";
 }
 
 }  // namespace

@@ -2,57 +2,20 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cstdint>
-#include <functional>
 #include <new>
-#include <span>
 #include <string>
 #include <thread>
-#include <utility>
 #include <vector>
 
 #include "tests/client/nif/support/frames.hpp"
 #include "tests/client/nif/support/own_clock.hpp"
+#include "tests/client/nif/support/short_stream.hpp"
 
 namespace gimnet::nif::test {
 namespace {
 
 using Texts = std::vector<std::string>;
-
-/// A kernel that takes `room` bytes, and then no more.
-class ShortStream final : public net::Stream {
- public:
-  [[nodiscard]] net::IoResult receive(std::span<std::byte> /*into*/) override { return {}; }
-  [[nodiscard]] net::IoResult send(std::span<const iovec> pieces) override {
-    if (on_send) on_send();
-    if (fails) return {net::IoStatus::failed, 0};
-    std::size_t taken = 0;
-    for (const iovec& piece : pieces) {
-      const std::size_t bytes = std::min(piece.iov_len, room);
-      const auto* begin = static_cast<const std::byte*>(piece.iov_base);
-      bytes_.insert(bytes_.end(), begin, begin + bytes);
-      room -= bytes;
-      taken += bytes;
-    }
-    return {taken > 0 ? net::IoStatus::ok : net::IoStatus::would_block, taken};
-  }
-  void shut_down() override {}
-  [[nodiscard]] std::uint64_t unsent_bytes() const override { return 0; }
-  void limit_unsent(std::uint32_t /*bytes*/) override {}
-  void limit_unacknowledged(std::uint32_t /*ms*/) override {}
-  [[nodiscard]] int descriptor() const override { return -1; }
-
-  /// The payloads of the frames that came since the last look.
-  [[nodiscard]] Texts taken() { return payloads(std::exchange(bytes_, {})); }
-
-  std::size_t room = SIZE_MAX;
-  bool fails = false;
-  std::function<void()> on_send;
-
- private:
-  std::vector<std::byte> bytes_;
-};
 
 /// A writer with all that it needs. Its thread is the library's and a sender's.
 struct Writing final : SocketWriter::Source {
