@@ -17,6 +17,20 @@ Run copy_alone(const Run& run, EgressContext& context) {
 
 }  // namespace
 
+void OpenRun::open(LaneQueue& of, const CopyChunk& chunk, std::uint64_t bytes_max) {
+  Entry& last = of.entries().back();
+  room = chunk.room();
+  if (!of.surely_fits(room, bytes_max)) {
+    room =
+        static_cast<std::uint32_t>(std::min<std::uint64_t>(room, of.room(last.block, bytes_max)));
+  }
+  attributes = load_le<std::uint32_t>(last.run.bytes + proto::kAttributesOffset);
+  addresses = load_le<std::uint64_t>(last.run.bytes + proto::kAddressesOffset);
+  end = chunk.end();
+  lane = &of;
+  entry = &last;
+}
+
 Run CopyChunk::copy(const Run& run, bool waits, EgressContext& context) {
   if (context.budget.scarce() && run.size >= BufferPool::kExactBytesMin)
     return copy_alone(run, context);

@@ -11,6 +11,8 @@
 
 namespace gimnet::hub {
 
+class CopyChunk;
+
 /// The last run of a lane, while frames with the same header may be copied right behind it: what
 /// the usual case of small messages needs to know, in one place. Whatever else happens to an outbox
 /// closes it first, so nothing else has to. Thread safety: one shard. Ownership: none; lane, entry
@@ -23,6 +25,9 @@ struct OpenRun {
   LaneQueue* lane = nullptr;
   Entry* entry = nullptr;
 
+  /// Frames may come behind the last entry of the lane, as far as the chunk and a lane of
+  /// `bytes_max` have room. REQUIRES: the entry ends where the chunk does.
+  void open(LaneQueue& of, const CopyChunk& chunk, std::uint64_t bytes_max);
   /// May `size` bytes of frames with one header come behind it? REQUIRES: size is not 0.
   [[nodiscard]] bool takes(const std::byte* frames, std::uint32_t size) const {
     return size <= room && load_le<std::uint64_t>(frames + proto::kAddressesOffset) == addresses &&

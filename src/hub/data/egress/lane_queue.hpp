@@ -55,6 +55,11 @@ class LaneQueue {
     const std::uint64_t share = bytes_max - std::min(half, block_bytes_);
     return share - std::min(share, bytes_ - block_bytes_);
   }
+  /// Do so many bytes more fit in a lane of `bytes_max`, whatever of it is sent with BLOCK? Most
+  /// often they do, and room() needs not be asked.
+  [[nodiscard]] bool surely_fits(std::uint64_t bytes, std::uint64_t bytes_max) const {
+    return bytes_ + bytes <= bytes_max / 2;
+  }
   /// Messages of that group of which the end waits.
   [[nodiscard]] std::uint64_t messages_of(GroupId group);
   /// Does a message wait of which nothing was written yet? The others are finished whatever

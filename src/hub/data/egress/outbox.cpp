@@ -67,7 +67,7 @@ void Outbox::push(const Run& run, const proto::FrameHeader& header, Handover han
     context.tally.queued -= run.frames;
     return push_in_pieces(run, header, handover, context);
   }
-  const bool has_room = surely_fits(lanes.queues[lane].bytes() + run.size, lane, context.limits) ||
+  const bool has_room = lanes.queues[lane].surely_fits(run.size, context.limits.lane_bytes(lane)) ||
                         run.size <= room(lane, proto::is_block(header), context.limits);
   Entry entry = make_entry(run, header, handover, has_room && !by_share, context);
   if (by_share) make_share(entry, header, context);
@@ -79,25 +79,10 @@ void Outbox::push(const Run& run, const proto::FrameHeader& header, Handover han
   if (!backlog_ && has_room) {
     const bool may_grow = proto::may_form_run(header) && chunk_.holds(entry.run);
     lanes.queues[lane].push(std::move(entry));
-    if (may_grow) open_run(lanes.queues[lane], context.limits, lane);
+    if (may_grow) lanes.open.open(lanes.queues[lane], chunk_, context.limits.lane_bytes(lane));
     return;
   }
   admit(std::move(entry), header, context);
-}
-
-void Outbox::open_run(LaneQueue& lane, const Limits& limits, std::size_t lane_index) {
-  Entry& last = lane.entries().back();
-  std::uint32_t open_room = chunk_.room();
-  if (!surely_fits(lane.bytes() + open_room, lane_index, limits)) {
-    open_room = static_cast<std::uint32_t>(
-        std::min<std::uint64_t>(open_room, room(lane_index, last.block, limits)));
-  }
-  lanes_->open = {open_room,
-                  load_le<std::uint32_t>(last.run.bytes + proto::kAttributesOffset),
-                  load_le<std::uint64_t>(last.run.bytes + proto::kAddressesOffset),
-                  chunk_.end(),
-                  &lane,
-                  &last};
 }
 
 bool Outbox::push_control(std::span<const std::byte> frame, EgressContext& context,

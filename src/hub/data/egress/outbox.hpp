@@ -221,19 +221,11 @@ class Outbox {
     if (!lanes_) lanes_ = std::make_unique<Lanes>();
     return *lanes_;
   }
-  /// More may be copied behind what was just put into the lane. REQUIRES: its last entry ends in
-  /// the chunk.
-  void open_run(LaneQueue& lane, const Limits& limits, std::size_t lane_index);
   [[nodiscard]] Entry make_entry(const Run& run, const proto::FrameHeader& header,
                                  Handover handover, bool has_room, EgressContext& context);
   [[nodiscard]] Run copy(const Run& run, EgressContext& context);
   [[nodiscard]] std::uint64_t room(std::size_t lane, bool block, const Limits& limits) const {
     return lanes_->queues[lane].room(block, limits.lane_bytes(lane));
-  }
-  /// Does so much fit in the lane, whatever of it is sent with BLOCK?
-  [[nodiscard]] static bool surely_fits(std::uint64_t bytes, std::size_t lane,
-                                        const Limits& limits) {
-    return bytes <= limits.lane_bytes(lane) / 2;
   }
   [[nodiscard]] bool fits(const Entry& entry, std::size_t lane, const Limits& limits) const {
     return entry.size <= room(lane, entry.block, limits);
