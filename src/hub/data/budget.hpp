@@ -95,6 +95,12 @@ class BudgetLease {
       budget_.give_back(piece_bytes_);
     }
   }
+  /// Memory that took `counted` bytes takes `bytes` now.
+  void change(std::uint64_t& counted, std::uint64_t bytes) {
+    if (bytes > counted) take(bytes - counted);
+    if (bytes < counted) give_back(counted - bytes);
+    counted = bytes;
+  }
   /// Is more pinned than could be leased? Then what would have to wait is refused.
   [[nodiscard]] bool exhausted() {
     if (used_ <= leased_) return false;

@@ -30,6 +30,22 @@ TEST(BudgetLease, LeasesInPiecesAndGivesBack) {
   EXPECT_EQ(budget.left(), 4 << 20);
 }
 
+TEST(BudgetLease, MemoryThatGrowsAndShrinksIsCountedOnce) {
+  Budget budget(64 * kMiB);
+  BudgetLease lease(budget);
+  std::uint64_t counted = 0;
+  lease.change(counted, 40 * kMiB);
+  EXPECT_EQ(budget.left(), 24 << 20);
+  lease.change(counted, 30 * kMiB);
+  lease.change(counted, 40 * kMiB);
+  EXPECT_EQ(budget.left(), 24 << 20);
+  lease.change(counted, 0);
+  EXPECT_EQ(counted, 0u);
+  lease.take(64 * kMiB);
+  EXPECT_FALSE(lease.exhausted()) << "all is free";
+  lease.give_back(64 * kMiB);
+}
+
 TEST(BudgetLease, MemoryIsScarceWhileLessThanAThirdIsFree) {
   Budget budget(30 * kMiB);
   BudgetLease lease(budget);

@@ -115,7 +115,7 @@ void Outbox::settle(EgressContext& context) {
   if (!lanes_) return;
   lanes_->open.close();
   if (begins) replace_latest(context);
-  charge_entries(context);
+  context.budget.change(lanes_->charged_bytes, entry_bytes());
   for (LaneQueue& lane : lanes_->queues) {
     lane.settle([&](Entry& entry) {
       settle_run(entry.run, entry.shared, context);
@@ -134,16 +134,12 @@ void Outbox::replace_latest(EgressContext& context) {
   }
 }
 
-void Outbox::charge_entries(EgressContext& context) {
+std::uint64_t Outbox::entry_bytes() const {
   std::uint64_t bytes = 0;
   for (const LaneQueue& queue : lanes_->queues) bytes += queue.capacity_bytes();
   // A ring doubles into new memory; the allocator keeps the old one for a while
   // (tests/stress/budget_test.cpp).
-  bytes += bytes / 2;
-  std::uint64_t& charged = lanes_->charged_bytes;
-  if (bytes > charged) context.budget.take(bytes - charged);
-  if (bytes < charged) context.budget.give_back(charged - bytes);
-  charged = bytes;
+  return bytes + bytes / 2;
 }
 
 void Outbox::settle_run(Run& run, bool shared, EgressContext& context) {

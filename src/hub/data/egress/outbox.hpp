@@ -262,9 +262,9 @@ class Outbox {
                                   EgressContext& context);
   [[nodiscard]] Run copy_control(std::span<const std::byte> frame, EgressContext& context);
   void replace_latest(EgressContext& context);
-  /// Many small messages that cannot form runs take more memory for their entries than for their
-  /// bytes.
-  void charge_entries(EgressContext& context);
+  /// Memory of the entries. Many small messages that cannot form runs take more for those than for
+  /// their bytes.
+  [[nodiscard]] std::uint64_t entry_bytes() const;
   [[nodiscard]] std::uint64_t data_bytes() const {
     std::uint64_t bytes = 0;
     if (lanes_)
