@@ -94,7 +94,7 @@ std::size_t PublishedService::subscribers() {
 Outcome<void> PublishedService::wait_for_subscribers(std::size_t count, Timeout timeout) {
   const std::int64_t deadline = deadline_after(timeout);
   const MutexLock lock(mutex_);
-  while (subscribers_ < count) {
+  while (end_ || subscribers_ < count) {
     if (end_) return end_.failure("wait for subscribers of " + full_name_);
     if (is_over(deadline)) {
       return Failure{Status::timeout, full_name_ + " has " + std::to_string(subscribers_) +

@@ -234,6 +234,14 @@ TEST_F(Wishes, OneWithAnAgeLimitTellsTheAgeOfItsMessages) {
   EXPECT_LE(age->age_ns, after_ns - *message.sent_ns() + error_ns);
 }
 
+TEST_F(Wishes, OfANodeThatEndedNobodyWaitsForSubscribers) {
+  Node camera("camera", hub_.url());
+  const Publisher pictures = camera.advertise("pictures").or_throw();
+  pictures.wait_for_subscribers(0).or_throw();
+  camera.close();
+  EXPECT_TRUE(pictures.wait_for_subscribers(0).is(Status::closed)) << "a loop over it ends";
+}
+
 class PublishedServices : public gimi::test::Conversation {};
 
 TEST_F(PublishedServices, SayTheLongestAgeOfTheirMessages) {
