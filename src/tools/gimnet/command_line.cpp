@@ -156,6 +156,8 @@ std::string too_many(const ToolOptions& options, const Called& called) {
 std::string contradiction(const ToolOptions& options) {
   if (options.json && options.raw)
     return "--json and --raw contradict each other: give one of them";
+  if (!options.text.empty() && !options.file.empty())
+    return "a text and --file contradict each other: give one of them";
   if (options.ascii + options.dot + options.json > 1 && options.command == Command::graph)
     return "--ascii, --dot and --json contradict each other: give one of them";
   if (options.command == Command::status && options.all && options.hub_id != 0)
@@ -239,7 +241,9 @@ std::string unexpected(const LeftOver& left, const std::vector<const CLI::Option
     const bool reads_lines = called.command == "send" || called.command == "pub";
     const std::string advice = called.command == "recv" ? "; did you mean --name " + word + "?"
                                : reads_lines ? ": messages are lines of its standard input"
-                                             : "";
+                               : called.command == "request"
+                                   ? ": put a text of several words in quotes"
+                                   : "";
     return "'" + word + "' is one word too many for " + called.text() + advice;
   }
   const std::string given = word.substr(0, word.find('='));

@@ -192,11 +192,9 @@ void add_requests(CLI::App& app, ToolOptions& options) {
   request.add_option("service", options.target, "full name: node/service")
       ->required()
       ->check(not_empty());
-  CLI::Option* const text =
-      request.add_option("text", options.text, "what to ask, default nothing");
+  request.add_option("text", options.text, "what to ask, default nothing");
   request.add_option("--file", options.file, "ask with the content of this file")
-      ->check(not_empty())
-      ->excludes(text);
+      ->check(not_empty());
   request
       .add_option("--timeout", options.timeout_s,
                   "seconds to wait for the answer, 0.001 to 3600, default 1")

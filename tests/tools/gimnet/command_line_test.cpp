@@ -134,6 +134,9 @@ TEST(CommandLine, SuggestsWhatANewcomerMeant) {
        "'hello' is one word too many for gimnet pub: messages are lines of its standard input");
   said({"send", "B", "hello"},
        "'hello' is one word too many for gimnet send: messages are lines of its standard input");
+  said({"request", "calc/add", "1", "2"},
+       "'2' is one word too many for gimnet request: put a text of several words in quotes");
+  said({"request", "calc/add", "1 2", "--file", "f"}, "a text and --file contradict each other");
   for (const char* const pattern : {"a/#", "a/+/b", "a.>"}) {
     for (const char* const command : {"echo", "hz", "bw", "watch", "nodes", "services"}) {
       said({command, pattern},
