@@ -164,8 +164,8 @@ class Services(unittest.TestCase):
             wait_until(lambda: paced.out, "a message, before the next one could take its place")
         for tool in (lines, objects, paced):
             self.assertEqual(tool.wait(), 0, tool.err)
-        said = ("gimnet: 941 messages of r/s did not come: this reader was too slow, or the sender's connection broke "
-                "(`gimnet status` counts what the hub dropped)\n")
+        said = ("gimnet: 941 messages of r/s did not come: this reader was too slow, or the sender's connection or "
+                "a link between hubs broke (`gimnet status` counts what the hub dropped)\n")
         self.assertEqual((lines.err, objects.err, paced.err), (said, said, ""))
         self.assertEqual([json.loads(line)["missed"] for line in objects.out.splitlines()], [0, 941])
         hub.expect_ledger(self, accepted=provider.frames_sent, copies=4, delivered=6)

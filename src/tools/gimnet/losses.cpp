@@ -160,9 +160,8 @@ std::vector<std::string> MissedMessages::rest() {
                  " did not come: " + queue_full_words("this reader", flooder_));
     // Nobody tells a reader whether it or the sender was in the way.
     add_sentence(sentences, service.unknown, name,
-                 " did not come: this reader was too slow, or the sender's connection broke "
-                 "(`gimnet status` "
-                 "counts what the hub dropped)");
+                 " did not come: this reader was too slow, or the sender's connection or a "
+                 "link between hubs broke (`gimnet status` counts what the hub dropped)");
   }
   untold_ = false;
   return sentences;

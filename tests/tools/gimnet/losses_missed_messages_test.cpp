@@ -13,9 +13,8 @@ using test::make_message;
 using Sentences = std::vector<std::string>;
 
 const char* const kUnknown =
-    " of r/s did not come: this reader was too slow, or the sender's connection broke (`gimnet "
-    "status` counts what the "
-    "hub dropped)";
+    " of r/s did not come: this reader was too slow, or the sender's connection or a "
+    "link between hubs broke (`gimnet status` counts what the hub dropped)";
 const char* const kBroken = " of r/s did not come: the connection to the hub was broken";
 
 const char* const kFlooded =
