@@ -1,4 +1,4 @@
-#include "client/nif/token_record.hpp"
+#include "client/nif/token_store.hpp"
 
 #include <cstdint>
 #include <cstdlib>

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "client/nif/event_record.hpp"
 #include "client/nif/message_assembler.hpp"
+#include "client/nif/record_list.hpp"
 #include "client/nif/reported_messages.hpp"
 #include "client/nif/session_terms.hpp"
 #include "client/nif/storage.hpp"

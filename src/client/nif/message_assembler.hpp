@@ -7,7 +7,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "client/nif/spare_buffers.hpp"
+#include "client/nif/storage.hpp"
 #include "client/nif/window_tuning.hpp"
 #include "proto/frame/frame_parser.hpp"
 #include "proto/frame/reassembler.hpp"

@@ -11,7 +11,6 @@
 #include <unordered_map>
 
 #include "client/nif/frame_run.hpp"
-#include "client/nif/retained_frames.hpp"
 #include "proto/frame/frame_header.hpp"
 
 namespace gimnet::nif {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "client/nif/event_record.hpp"
+#include "client/nif/record_list.hpp"
 
 namespace gimnet::nif {
 namespace {

@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <fstream>
 
-#include "client/nif/token_record.hpp"
 #include "tests/client/nif/support/runtime_folder.hpp"
 
 namespace gimnet::nif::test {

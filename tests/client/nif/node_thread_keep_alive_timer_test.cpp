@@ -1,4 +1,4 @@
-#include "client/nif/keep_alive_timer.hpp"
+#include "client/nif/node_thread.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "client/nif/spare_buffers.hpp"
+#include "client/nif/storage.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "client/nif/hub_addresses.hpp"
+#include "client/nif/options.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>

@@ -1,4 +1,4 @@
-#include "client/nif/retained_frames.hpp"
+#include "client/nif/frame_run.hpp"
 
 #include <gtest/gtest.h>
 

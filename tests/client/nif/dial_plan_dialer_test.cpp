@@ -1,4 +1,4 @@
-#include "client/nif/dialer.hpp"
+#include "client/nif/dial_plan.hpp"
 
 #include <gtest/gtest.h>
 
