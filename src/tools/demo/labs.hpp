@@ -5,7 +5,7 @@
 #include <string>
 
 #include "base/result.hpp"
-#include "tools/demo/labs_summary.hpp"
+#include "tools/demo/summary.hpp"
 #include "tools/demo/terminal.hpp"
 
 namespace gimnet::demo {

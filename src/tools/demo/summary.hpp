@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "tools/demo/monitor.hpp"
+#include "tools/demo/node_port.hpp"
 
 namespace gimnet::demo {
 
@@ -32,5 +33,36 @@ struct RunRecord {
 
 /// The figures of a run as a table, and the verdict.
 [[nodiscard]] std::string summary_text(const Monitor& monitor, const RunRecord& run, bool utf8);
+
+/// The facts about a run of `--labs`. A value type.
+struct LabsRecord {
+  /// A machine, and what its driver heard of it.
+  struct Machine {
+    std::string name;
+    std::string kind;
+    std::string hub;          ///< the one that it is connected to
+    std::string driven_from;  ///< the hub of its driver
+    Monitor monitor;
+    RunRecord run;
+  };
+  struct Hub {
+    std::string name;
+    HubCounters counters;
+  };
+  std::vector<Machine> machines;
+  std::vector<Hub> hubs;
+  std::uint64_t pictures = 0;  ///< that the camera sent
+  std::uint64_t picture_bytes = 0;
+  std::vector<std::uint64_t> seen;  ///< of them by each viewer, in order and whole
+  std::uint64_t wan_bytes = 0;      ///< that crossed the WAN towards the viewers
+  std::uint64_t cuts = 0;           ///< of the WAN
+};
+
+/// Everything that went wrong, a sentence each; empty: nothing was lost, and the pictures crossed
+/// the WAN once. Thread safety: pure functions.
+[[nodiscard]] std::vector<std::string> complaints_about(const LabsRecord& record);
+
+/// The figures of the run as a table, and the verdict.
+[[nodiscard]] std::string summary_text(const LabsRecord& record);
 
 }  // namespace gimnet::demo

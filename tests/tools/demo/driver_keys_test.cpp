@@ -1,4 +1,4 @@
-#include "tools/demo/keys.hpp"
+#include "tools/demo/driver.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

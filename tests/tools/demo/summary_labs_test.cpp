@@ -1,4 +1,4 @@
-#include "tools/demo/labs_summary.hpp"
+#include "tools/demo/summary.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
