@@ -8,7 +8,7 @@
 #include "base/log.hpp"
 #include "base/random.hpp"
 #include "hub/config/folders.hpp"
-#include "hub/config/reloader.hpp"
+#include "hub/config/sources.hpp"
 #include "hub/config/state_folder.hpp"
 #include "hub/control/conductor.hpp"
 #include "hub/control/conductor_loop.hpp"

@@ -18,7 +18,6 @@
 
 #include "base/clock.hpp"
 #include "base/mutex.hpp"
-#include "impair/relayed_connection.hpp"
 #include "net/host_lookup.hpp"
 
 namespace gimnet::impair {

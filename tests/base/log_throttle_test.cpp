@@ -1,4 +1,4 @@
-#include "base/log_throttle.hpp"
+#include "base/log.hpp"
 
 #include <gtest/gtest.h>
 

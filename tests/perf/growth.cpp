@@ -19,7 +19,7 @@
 #include <vector>
 
 #include "client/gimi/clerk.hpp"
-#include "client/nif/name_cache.hpp"
+#include "client/nif/node_parts.hpp"
 #include "client/nif/outbound.hpp"
 #include "hub/control/state/directory.hpp"
 #include "hub/control/state/listing.hpp"

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "base/id_text.hpp"
+#include "base/ids.hpp"
 #include "client/nif/api.hpp"
 #include "client/nif/record_list.hpp"
 #include "client/nif/sized_struct.hpp"

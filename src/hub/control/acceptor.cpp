@@ -1,6 +1,7 @@
 #include "hub/control/acceptor.hpp"
 
 #include <arpa/inet.h>
+#include <fcntl.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -13,6 +14,31 @@
 #include "hub/shard/control_frame.hpp"
 
 namespace gimnet::hub {
+
+int open_spare_descriptor() { return ::open("/dev/null", O_RDONLY | O_CLOEXEC); }
+
+DescriptorReserve::DescriptorReserve(const Limits& limits) : limits_(limits) { fill(); }
+
+DescriptorReserve::~DescriptorReserve() {
+  for (const int descriptor : kept_) ::close(descriptor);
+}
+
+void DescriptorReserve::fill() {
+  while (kept_.size() > limits_.administrators) static_cast<void>(give_up_one());
+  while (kept_.size() < limits_.administrators) {
+    const int descriptor = open_spare_descriptor();
+    if (descriptor < 0) return;
+    kept_.push_back(descriptor);
+  }
+}
+
+bool DescriptorReserve::give_up_one() {
+  if (kept_.empty()) return false;
+  ::close(kept_.back());
+  kept_.pop_back();
+  return true;
+}
+
 namespace {
 
 constexpr int kBatch = 64;

@@ -1,7 +1,7 @@
 #include "hub/control/conductor.hpp"
 
 #include "base/check.hpp"
-#include "base/id_text.hpp"
+#include "base/ids.hpp"
 #include "base/log.hpp"
 #include "hub/control/dispatch.hpp"
 #include "hub/control/log_peer.hpp"

@@ -25,7 +25,6 @@
 #include "hub/control/table_publisher.hpp"
 #include "hub/limits.hpp"
 #include "hub/observe/counters.hpp"
-#include "hub/observe/refusal_counters.hpp"
 #include "hub/observe/request_counters.hpp"
 #include "hub/observe/session_gauges.hpp"
 #include "hub/shard/commands.hpp"

@@ -7,7 +7,7 @@
 #include "hub/control/link_dialler.hpp"
 #include "hub/control/listener.hpp"
 #include "hub/limits.hpp"
-#include "hub/observe/refusal_counters.hpp"
+#include "hub/observe/request_counters.hpp"
 #include "hub/shard/commands.hpp"
 
 namespace gimnet::hub {

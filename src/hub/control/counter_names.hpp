@@ -5,7 +5,6 @@
 #include <string>
 
 #include "hub/observe/counters.hpp"
-#include "hub/observe/refusal_counters.hpp"
 #include "hub/observe/request_counters.hpp"
 
 namespace gimnet::hub {

@@ -8,7 +8,6 @@
 #include "hub/control/handle/names.hpp"
 #include "hub/control/handle/network.hpp"
 #include "hub/control/handle/services.hpp"
-#include "hub/control/handle/watch.hpp"
 #include "proto/control/ctrl_network.hpp"
 #include "proto/control/ns_register.hpp"
 #include "proto/control/ns_watch.hpp"

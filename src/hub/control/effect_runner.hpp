@@ -2,6 +2,7 @@
 
 #include <chrono>
 
+#include "base/ids.hpp"
 #include "hub/control/group_links.hpp"
 #include "hub/control/hub_facts.hpp"
 #include "hub/control/network_names.hpp"
@@ -16,6 +17,15 @@
 #include "proto/control/control_message.hpp"
 
 namespace gimnet::hub {
+
+// The changes of nodes and services as lines of level debug: what somebody who watches everything
+// is told, and who has another id. Costs nothing at other levels. Thread safety: the conductor's
+// thread only.
+
+/// REQUIRES: `membership` is as it was left by what led to the change.
+void log_change(const NodeNoted& noted, const Membership& membership, HubId hub);
+void log_change(const ServiceNoted& noted, const Membership& membership, HubId hub);
+void log_change(const RenumberDue& due, const Membership& membership, HubId hub);
 
 /// Carries out what the state machines want done: publishes tables, commands shards, tells nodes,
 /// and keeps what has to outlive the hub. In the order in which they wanted it, which is part of

@@ -13,7 +13,7 @@
 #include "hub/control/network_names.hpp"
 #include "hub/control/state/membership.hpp"
 #include "hub/limits.hpp"
-#include "hub/observe/refusal_counters.hpp"
+#include "hub/observe/request_counters.hpp"
 #include "proto/control/control_message.hpp"
 #include "proto/control/link.hpp"
 

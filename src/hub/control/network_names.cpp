@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "base/id_text.hpp"
+#include "base/ids.hpp"
 #include "base/log.hpp"
 #include "hub/control/next_hops.hpp"
 

@@ -12,7 +12,7 @@
 
 #include "hub/control/acceptor.hpp"
 #include "hub/limits.hpp"
-#include "hub/observe/refusal_counters.hpp"
+#include "hub/observe/request_counters.hpp"
 #include "net/accept_handshake.hpp"
 
 namespace gimnet::hub {

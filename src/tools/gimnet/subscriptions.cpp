@@ -73,9 +73,9 @@ std::string Subscriptions::waits_for() const {
   if (follower_)
     return follower_->any() ? "" : "no service matches " + word_ + " yet; waiting for one";
   if (!one_ || one_->exists()) return "";
-  return is_unreachable()
-             ? "there is no way to the hub of " + word_ + "; waiting for one; `gimnet hubs` shows it"
-             : "nobody provides " + word_ + " yet; waiting for it";
+  return is_unreachable() ? "there is no way to the hub of " + word_ +
+                                "; waiting for one; `gimnet hubs` shows it"
+                          : "nobody provides " + word_ + " yet; waiting for it";
 }
 
 /// The hub lists services of another one as long as it keeps their nodes' names.

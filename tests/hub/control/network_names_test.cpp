@@ -7,7 +7,6 @@
 #include "base/log.hpp"
 #include "hub/control/handle/names.hpp"
 #include "hub/control/handle/services.hpp"
-#include "hub/control/handle/watch.hpp"
 
 namespace gimnet::hub {
 namespace {

@@ -1,6 +1,6 @@
 #include <algorithm>
 
-#include "base/id_text.hpp"
+#include "base/ids.hpp"
 #include "tests/sim/hubs/world.hpp"
 
 // Looks at a world that was left alone: names, and whether everybody reaches everybody.

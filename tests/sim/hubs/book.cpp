@@ -1,7 +1,7 @@
 #include "tests/sim/hubs/book.hpp"
 
 #include "base/endian.hpp"
-#include "base/id_text.hpp"
+#include "base/ids.hpp"
 
 namespace gimnet::sim::hubs {
 namespace {

@@ -1,4 +1,4 @@
-#include "base/id_text.hpp"
+#include "base/ids.hpp"
 #include "tests/sim/hubs/world.hpp"
 
 // Looks at a world that was left alone: services whose subscribers are at all hubs.

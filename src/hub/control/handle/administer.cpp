@@ -1,6 +1,6 @@
 #include "hub/control/handle/administer.hpp"
 
-#include "base/id_text.hpp"
+#include "base/ids.hpp"
 #include "base/suggest.hpp"
 #include "proto/control/ctrl.hpp"
 #include "proto/control/fields.hpp"

@@ -15,7 +15,6 @@
 #include "hub/limits.hpp"
 #include "hub/network/state/name_exchange.hpp"
 #include "hub/observe/counters.hpp"
-#include "hub/observe/refusal_counters.hpp"
 #include "hub/observe/request_counters.hpp"
 #include "hub/observe/session_gauges.hpp"
 #include "hub/shard/commands.hpp"

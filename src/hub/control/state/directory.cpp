@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "base/check.hpp"
-#include "base/id_text.hpp"
+#include "base/ids.hpp"
 #include "base/log.hpp"
 #include "hub/control/state/topics.hpp"
 #include "hub/network/state/name_copies.hpp"

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "base/check.hpp"
-#include "base/id_text.hpp"
+#include "base/ids.hpp"
 
 namespace gimnet::hub {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "base/id_text.hpp"
+#include "base/ids.hpp"
 #include "proto/control/names.hpp"
 
 namespace gimnet::hub {

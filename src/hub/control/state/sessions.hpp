@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -19,7 +20,6 @@
 #include "hub/control/state/due_list.hpp"
 #include "hub/control/state/identity.hpp"
 #include "hub/control/state/index_pool.hpp"
-#include "hub/control/state/number_floor.hpp"
 #include "hub/control/state/place.hpp"
 #include "hub/control/state/session_token.hpp"
 #include "hub/control/state/slot_pool.hpp"
@@ -27,6 +27,22 @@
 #include "proto/control/link.hpp"
 
 namespace gimnet::hub {
+
+/// For each node index the least session number whose token may still claim it: lower ones are of
+/// sessions that left, or after which somebody else had the index. Thread safety: none. Limits: 8
+/// bytes an index, in pages of 4,096, of which there are only those that were written.
+class NumberFloor {
+ public:
+  /// 0 where nothing was raised.
+  [[nodiscard]] SessionNumber at(NodeIndex index) const;
+  /// From now on tokens below `number` do not claim the index. Never lowers.
+  void raise(NodeIndex index, SessionNumber number);
+
+ private:
+  static constexpr std::uint32_t kPage = 4'096;
+  using Page = std::array<SessionNumber, kPage>;
+  std::vector<std::unique_ptr<Page>> pages_;
+};
 
 /// A note that a session's grace time began. It is void once the session came back or ended.
 struct Absence {

@@ -6,7 +6,7 @@
 #include <tuple>
 #include <vector>
 
-#include "base/id_text.hpp"
+#include "base/ids.hpp"
 #include "base/log.hpp"
 #include "proto/control/ctrl.hpp"
 #include "proto/control/ns.hpp"

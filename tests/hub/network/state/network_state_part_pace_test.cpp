@@ -1,4 +1,4 @@
-#include "hub/network/state/part_pace.hpp"
+#include "hub/network/state/network_state.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "hub/control/handle/watch.hpp"
+#include "hub/control/handle/names.hpp"
 
 #include <gtest/gtest.h>
 

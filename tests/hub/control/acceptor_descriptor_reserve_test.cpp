@@ -1,4 +1,4 @@
-#include "hub/control/descriptor_reserve.hpp"
+#include "hub/control/acceptor.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>

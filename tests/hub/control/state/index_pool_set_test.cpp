@@ -1,4 +1,4 @@
-#include "hub/control/state/index_set.hpp"
+#include "hub/control/state/index_pool.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "hub/control/state/number_floor.hpp"
+#include "hub/control/state/sessions.hpp"
 
 #include <gtest/gtest.h>
 

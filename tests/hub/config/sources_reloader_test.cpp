@@ -1,4 +1,4 @@
-#include "hub/config/reloader.hpp"
+#include "hub/config/sources.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

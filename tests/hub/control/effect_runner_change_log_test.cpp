@@ -1,4 +1,4 @@
-#include "hub/control/change_log.hpp"
+#include "hub/control/effect_runner.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

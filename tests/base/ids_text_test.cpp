@@ -1,4 +1,4 @@
-#include "base/id_text.hpp"
+#include "base/ids.hpp"
 
 #include <gtest/gtest.h>
 
