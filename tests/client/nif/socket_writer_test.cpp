@@ -211,7 +211,8 @@ TEST(SocketWriter, NothingIsWrittenWithoutAConnectionButTheLastWords) {
 
 TEST(SocketWriter, DetachWaitsForWhoeverWrites) {
   Writing line;
-  bool written = false;
+  bool written = false;  // these two under the mutex
+  bool detached = false;
   std::thread detaching;
   line.stream.on_send = [&] {
     detaching = std::thread([&] {
@@ -220,12 +221,13 @@ TEST(SocketWriter, DetachWaitsForWhoeverWrites) {
       line.writer.detach(line.mutex);
       EXPECT_TRUE(written);
       EXPECT_FALSE(line.writer.writing());
+      detached = true;
     });
     for (bool waits = false; !waits; std::this_thread::yield()) {
       const MutexLock lock(line.mutex);
-      waits = line.waiters.count() == 1;
+      waits = line.waiters.count() == 1 || detached;
+      written = waits && !detached;
     }
-    written = true;
   };
   line.send("one");
   detaching.join();
