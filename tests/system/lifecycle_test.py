@@ -171,6 +171,17 @@ class Nodes(unittest.TestCase):
         wait_until(lambda: "nobody provides a/b yet" in waiting.err, "the words that it waits")
 
 
+class StandsStill(unittest.TestCase):
+    def test_send_says_for_whom_it_waits(self):
+        hub = Hub(self, "--limit", "silent_ms=600000")
+        receiver = start_recv(self, hub, "B", "-n", "2")
+        receiver.signal(signal.SIGSTOP)
+        sender = start_gimnet(self, hub, "send", "B", stdin=subprocess.PIPE).feed(b"one\ntwo\n")
+        wait_until(lambda: "waiting for B to acknowledge 2 messages" in sender.err, f"the words; it said: {sender.err}")
+        receiver.signal(signal.SIGCONT)
+        self.assertEqual((sender.wait(), receiver.wait()), (0, 0), sender.err)
+
+
 class Killed(unittest.TestCase):
     def test_a_publisher_goes_on_with_its_next_line(self):
         hub = Hub(self)

@@ -22,6 +22,8 @@ namespace {
 constexpr std::size_t kWindow = 64;
 /// The largest message that any node can take.
 constexpr std::size_t kMessageBytesMax = std::size_t{1} << 30;
+/// The wait for acknowledgements of which nothing is said.
+constexpr Timeout kSilentWait{2'000};
 
 /// So that a wrong name is known before anything else is done.
 Outcome<void> check_readable(const std::string& path) {
@@ -37,7 +39,18 @@ Outcome<void> send_one(const Sender& sender, BytesView message, More more) {
                  sent.failure().sentence + " (`gimnet recv` takes larger ones with --max-size)"};
 }
 
-Outcome<void> send_file(const Sender& sender, const std::string& path) {
+/// Waits for the fate of all messages. If that takes long, it says for whom it waits.
+Outcome<void> settle(const Sender& sender, const std::string& target) {
+  auto settled = sender.settle(kSilentWait);
+  if (settled || !settled.is(Status::timeout)) return settled;
+  const std::uint64_t waiting = sender.counts().waiting;
+  say("waiting for " + target + " to acknowledge " + std::to_string(waiting) +
+      (waiting == 1 ? " message" : " messages"));
+  return sender.settle();
+}
+
+Outcome<void> send_file(const Sender& sender, const ToolOptions& options) {
+  const std::string& path = options.file;
   const auto content = FileContent::read(path, kMessageBytesMax);
   if (!content) return content.failure();
   const std::int64_t begin_ns = steady_now_ns();
@@ -46,7 +59,7 @@ Outcome<void> send_file(const Sender& sender, const std::string& path) {
            ": " + std::to_string((steady_now_ns() - begin_ns) / 1'000'000'000) + " s";
   });
   if (auto sent = send_one(sender, content->bytes(), More::no); !sent) return sent;
-  return sender.settle();
+  return settle(sender, options.target);
 }
 
 /// The part of the input that was not sent.
@@ -169,9 +182,9 @@ ExitCode run_send(ToolSession& session) {
                                  : session.node().sender(*peer, stream);
   if (!sender) return session.fail(sender.failure());
   Unsent unsent = Unsent::nothing;
-  auto sent = options.file.empty() ? send_lines(session, *sender, unsent)
-                                   : send_file(*sender, options.file);
-  if (sent && !session.stopped()) sent = sender->settle();
+  auto sent =
+      options.file.empty() ? send_lines(session, *sender, unsent) : send_file(*sender, options);
+  if (sent && !session.stopped()) sent = settle(*sender, options.target);
   const SendCounts counts = sender->counts();
   print(session, counts);
   if (sent) return session.finish();
