@@ -3,8 +3,9 @@
 
 /* Options of GIMI's calls. Included by gimnet/gimi.h. Each begins with its struct_size, which
  * GIMI_OPTIONS() fills. Zero always means the default, and where a call takes a pointer to options,
- * NULL means all defaults. A later library has more members; one that is older refuses a program
- * that sets a member which it does not have. */
+ * NULL means all defaults. A later library has more members, at the
+ * end and in place of `reserved`; one that is older refuses a program that sets a member which it
+ * does not have. So `reserved` must be zero. */
 
 #include "gimnet/gimi_types.h"
 

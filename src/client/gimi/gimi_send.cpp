@@ -81,7 +81,8 @@ gimi_status gimi_accept(gimi_handle node, const char* name, const gimi_accept_op
   *queue = 0;
   return with<NodeObject>(node, [&](NodeObject& found) {
     return with_options(options, "accept", "gimi_accept_options", [&](const auto& given) {
-      if (given.lease_ms != 0 || given.safe_message.data != nullptr)
+      const gimi_bytes& safe = given.safe_message;
+      if (given.lease_ms != 0 || safe.data != nullptr || safe.size != 0)
         return fail(GIMI_BAD_ARGUMENT, "this version of the library has no lease of a service");
       AcceptOptions how;
       how.key = key_of(given.key);

@@ -1,0 +1,95 @@
+#include <gtest/gtest.h>
+
+#include <cstddef>
+#include <cstring>
+#include <span>
+#include <typeinfo>
+
+#include "gimnet/gimi.h"
+#include "tests/client/gimi/support/hub_process.hpp"
+
+// Options of gimnet/gimi.h whose values are outside their ranges.
+
+namespace gimnet {
+namespace {
+
+class GimiOptions : public testing::Test {
+ protected:
+  void SetUp() override {
+    gimi_node_options options{};
+    options.struct_size = sizeof options;
+    options.hub = hub_.url().c_str();
+    options.name = "robot";
+    ASSERT_EQ(gimi_join(&options, &node_), GIMI_OK);
+  }
+  void TearDown() override { EXPECT_EQ(gimi_close(node_), GIMI_OK); }
+
+  template <class Options>
+  static Options made() {
+    Options options{};
+    options.struct_size = sizeof options;
+    return options;
+  }
+  /// Every byte of `reserved` is looked at, in options of this version's size and of a later one's.
+  template <class Options, class Call>
+  static void refuses_reserved(const Call& call) {
+    struct Longer {
+      Options now;
+      std::size_t later = 0;
+    };
+    for (std::size_t i = 0; i < sizeof(Options::reserved); ++i) {
+      for (const std::size_t size : {sizeof(Options), sizeof(Longer)}) {
+        Longer longer{};
+        longer.now.struct_size = size;
+        std::as_writable_bytes(std::span(&longer.now.reserved, 1))[i] = std::byte{1};
+        EXPECT_EQ(call(&longer.now), GIMI_BAD_ARGUMENT) << typeid(Options).name() << " byte " << i;
+        EXPECT_NE(std::strstr(gimi_error_text(), "does not have"), nullptr) << gimi_error_text();
+      }
+    }
+  }
+
+  test::HubProcess hub_;
+  gimi_handle node_ = 0;
+};
+
+TEST_F(GimiOptions, RoomForLaterVersionsMustBeZero) {
+  gimi_handle made = 0;
+  gimi_reply reply{};
+  refuses_reserved<gimi_node_options>([&](auto* how) {
+    how->hub = hub_.url().c_str();
+    return gimi_join(how, &made);
+  });
+  refuses_reserved<gimi_publish_options>(
+      [&](auto* how) { return gimi_advertise(node_, "a", how, &made); });
+  refuses_reserved<gimi_subscribe_options>(
+      [&](auto* how) { return gimi_subscribe(node_, "a/b", how, &made); });
+  refuses_reserved<gimi_accept_options>(
+      [&](auto* how) { return gimi_accept(node_, "a", how, &made); });
+  refuses_reserved<gimi_send_options>([&](auto* how) { return gimi_sender(node_, 1, how, &made); });
+  refuses_reserved<gimi_queue_options>(
+      [&](auto* how) { return gimi_queue(node_, {1, 1}, how, &made); });
+  refuses_reserved<gimi_request_options>(
+      [&](auto* how) { return gimi_ask(node_, "a/b", nullptr, how, &reply); });
+  refuses_reserved<gimi_answer_options>(
+      [&](auto* how) { return gimi_answer(node_, "a", how, &made); });
+  refuses_reserved<gimi_link_options>([&](auto* how) {
+    how->url = "unix:/nowhere";
+    return gimi_add_link(node_, how, 1000);
+  });
+  EXPECT_EQ(made, 0u);
+}
+
+TEST_F(GimiOptions, ALeaseIsRefusedInEachOfItsMembers) {
+  gimi_handle queue = 0;
+  auto options = made<gimi_accept_options>();
+  options.safe_message = {nullptr, 1};
+  EXPECT_EQ(gimi_accept(node_, "a", &options, &queue), GIMI_BAD_ARGUMENT);
+  options.safe_message = {"x", 0};
+  EXPECT_EQ(gimi_accept(node_, "a", &options, &queue), GIMI_BAD_ARGUMENT);
+  options.safe_message = {};
+  options.lease_ms = 1;
+  EXPECT_EQ(gimi_accept(node_, "a", &options, &queue), GIMI_BAD_ARGUMENT);
+}
+
+}  // namespace
+}  // namespace gimnet
