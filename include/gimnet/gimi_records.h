@@ -123,7 +123,7 @@ typedef struct gimi_network_hub_record {
 typedef struct gimi_link_record {
   const char* name;
   const char* peer;  /**< The URL that is dialled, or where the other side came from. */
-  const char* state; /**< dialling, away, learning, standby, damped or up. */
+  const char* state; /**< dialling, away, learning, standby, damped, up or ended. */
   const char* last_error;
   uint32_t hub_id;         /**< At the other end; 0: not known. */
   uint32_t cost;           /**< 0: not measured yet. */

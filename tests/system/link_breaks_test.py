@@ -6,8 +6,10 @@ import json
 import os
 import shutil
 import signal
+import socket
 import struct
 import subprocess
+import tempfile
 import threading
 import unittest
 
@@ -55,6 +57,53 @@ class Sender(threading.Thread):
     def stop(self):
         self._stopped.set()
         self.join()
+
+
+class OneSided:
+    """Carries a link. cut() ends the connection of the hub that dials; the other one sees nothing of it, and waits."""
+
+    def __init__(self, test, port):
+        self._port, self._near, self._all, self._cut = port, [], [], False
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self.url = f"tcp://127.0.0.1:{self._listener.getsockname()[1]}"
+        test.addCleanup(self._end)
+        threading.Thread(target=self._accept, daemon=True).start()
+
+    def cut(self):
+        self._cut = True
+        for near in self._near:
+            near.shutdown(socket.SHUT_RDWR)
+        self._near.clear()
+
+    def mend(self):
+        self._cut = False
+
+    def _accept(self):
+        try:
+            while True:
+                near = self._listener.accept()[0]
+                if self._cut:
+                    near.close()
+                    continue
+                far = socket.create_connection(("127.0.0.1", self._port))
+                self._near.append(near)
+                self._all += [near, far]
+                for ends in ((near, far), (far, near)):
+                    threading.Thread(target=self._carry, args=ends, daemon=True).start()
+        except OSError:
+            pass  # the test ends
+
+    @staticmethod
+    def _carry(source, target):
+        try:
+            while data := source.recv(1 << 16):
+                target.sendall(data)
+        except OSError:
+            pass  # the other end is told nothing
+
+    def _end(self):
+        for end in (self._listener, *self._all):
+            end.close()
 
 
 class Breaks(unittest.TestCase):
@@ -118,12 +167,37 @@ class Breaks(unittest.TestCase):
             self.until_more()
         self.expect_all_told()
 
-    def until_silent(self, hub):
+    def test_the_counts_agree_after_one_end_alone_withdrew_the_link(self):
+        file = os.path.join(self.enterContext(tempfile.TemporaryDirectory(prefix="gimnet-test-")), "hub.toml")
+        with open(file, "w", encoding="utf-8") as text:
+            text.write("[links]\naccept_links = true\nsilent_ms = 60000\n")
+        first = Hub(self, "--config", file, *PATIENT, hub_id=1)
+        wire = OneSided(self, first.port)
+        last = Hub(self, "--link", wire.url, *PATIENT, hub_id=3)
+        self.begin(last, first)
+        for _ in range(2):
+            wire.cut()
+            self.until_silent(last, ("dialling",))
+            self.assertEqual(self.link_of(first)["state"], "up", "it saw nothing")
+            wire.mend()
+            self.until_more()
+        self.expect_all_told()
+        status = json.loads(run_gimnet(first, "status", "--all", "--json").out)
+        self.assertTrue(status["exact"], status)
+        near, far = self.link_of(last), self.link_of(first)
+        self.assertEqual(near["unsure"], self.sender.reported[LINK_UNSURE])
+        self.assertGreater(near["unsure"], 0)
+        told = near["delivered"] + near["dropped"] + last.counter("dropped.no_route")
+        self.assertEqual(told, self.stream.sent, "the counts of all three sessions")
+        self.assertLessEqual(near["delivered"], far["accepted"])
+
+    def link_of(self, hub):
+        links = json.loads(run_gimnet(hub, "links", "--json").out or "[]")
+        return links[0] if links else {"state": "none"}
+
+    def until_silent(self, hub, states=("dialling", "away")):
         """The link of the hub has no connection any more."""
-        def silent():
-            links = json.loads(run_gimnet(hub, "links", "--json").out or "[]")
-            return links and links[0]["state"] in ("dialling", "away")
-        wait_until(silent, "the end of a silent link")
+        wait_until(lambda: self.link_of(hub)["state"] in states, "the end of a silent link")
 
 
 if __name__ == "__main__":

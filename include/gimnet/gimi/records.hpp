@@ -158,7 +158,7 @@ struct LinkRecord {
   std::string name;
   std::uint32_t hub_id = 0;          ///< at the other end; 0: not known
   std::string peer;                  ///< the URL that is dialled, or where the other side came from
-  std::string state;                 ///< dialling, away, learning, standby, damped or up
+  std::string state;                 ///< dialling, away, learning, standby, damped, up or ended
   bool dialled = false;              ///< by this hub
   std::uint32_t cost = 0;            ///< 0: not measured yet
   std::uint32_t rtt_us = 0;          ///< 0: none yet

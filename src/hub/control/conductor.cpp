@@ -165,6 +165,8 @@ void Conductor::on_event(ShardEvent event, milliseconds now) {
     links_->on_detached(*detached, moment(now));
     settle(now);
     admit_moved({}, now);
+  } else if (const auto* released = std::get_if<ReleasedEvent>(&event.what)) {
+    if (links_ != nullptr) links_->on_released(*released);
   } else if (const auto* missed = std::get_if<EventsMissedEvent>(&event.what)) {
     if (const Session* session = find(missed->session, missed->node))
       runner_.events_missed(*session, missed->attachment);
@@ -202,9 +204,8 @@ void Conductor::on_frame(const ControlFrameEvent& event, milliseconds now) {
   }
   Effects effects;
   HandlerContext context = context_for(effects, now);
-  const NodeId dst{header.dst};
-  const bool names_us = dst == make_id<NodeId>(facts_.id, kHubIndex);
-  const bool is_ours = dst == NodeId{} || names_us;
+  const bool names_us = NodeId{header.dst} == make_id<NodeId>(facts_.id, kHubIndex);
+  const bool is_ours = header.dst == 0 || names_us;
   const Request request{*session, view->header, payload, names_us};
   const ShardIndex shard = session->place.shard;
   std::optional<proto::Refusal> refusal;
@@ -283,11 +284,10 @@ void Conductor::on_detached(const DetachedEvent& event, milliseconds now) {
   Session* session = find(event.session, event.node);
   // The end of a connection that a newer one has replaced says nothing about the session.
   if (session == nullptr || event.attachment != session->attachment || !session->connected) return;
-  const bool said = event.said_by_peer || event.code != GoodbyeCode::done;
   std::string line = title(node_id(*session), *session);
   if (event.said_by_peer && event.code == GoodbyeCode::done) {
     line += " left";
-  } else if (said) {
+  } else if (event.said_by_peer || event.code != GoodbyeCode::done) {
     line += std::string{event.said_by_peer ? " said goodbye: " : " was closed: "} +
             proto::goodbye_name(event.code) + (event.sentence.empty() ? "" : ": ") + event.sentence;
   } else {

@@ -65,6 +65,7 @@ void HubLink::begin_connection(const proto::HubIntroduction& said, const LinkTer
   }
   if (!is_dialled()) follow_cost(said.cost);
   resume_until_.reset();
+  over_since_.reset();
   dial_at_.reset();
   backoff_.reset();
   while (!breaks_.empty() && breaks_.front() + kBreaksWithin <= now) breaks_.pop_front();
@@ -87,7 +88,7 @@ void HubLink::end_connection(bool at_once, milliseconds now) {
   resume_until_ = now + kResumeTime + 4 * round_trip;
 }
 
-void HubLink::note_detached(const DetachedEvent& event) {
+bool HubLink::note_detached(const DetachedEvent& event) {
   epoch = event.epoch;
   peer_epoch = event.peer_epoch;
   taken = event.taken;
@@ -100,6 +101,7 @@ void HubLink::note_detached(const DetachedEvent& event) {
   // `done` is an administrator's wish.
   log_line(event.said_by_peer && done ? LogLevel::info : LogLevel::warning, {"link", name_},
            "link " + name_ + " to " + title() + ": " + last_error);
+  return event.code == proto::GoodbyeCode::silent || (done && !event.said_by_peer);
 }
 
 void HubLink::warn_of_crowding() const {

@@ -38,6 +38,8 @@ class HubLink {
   static constexpr std::size_t kBreaksMost = 2;
   static constexpr std::chrono::milliseconds kBreaksWithin = std::chrono::minutes(1);
   static constexpr std::chrono::milliseconds kDampedMost = std::chrono::seconds(10);
+  /// A link that the other side gave up is shown for so long.
+  static constexpr std::chrono::milliseconds kEndedShown = std::chrono::minutes(10);
   /// The other clock is compared by the shortest of so many latest round trips, since clocks drift.
   static constexpr std::size_t kClockSamples = 16;
 
@@ -65,8 +67,9 @@ class HubLink {
                         std::chrono::milliseconds now);
   /// The connection broke. `at_once`: one end said GOODBYE, and nothing is resumed.
   void end_connection(bool at_once, std::chrono::milliseconds now);
-  /// Keeps what `event` tells of the connection that ended, and says in the log why it did.
-  void note_detached(const DetachedEvent& event);
+  /// Keeps what `event` tells of the connection that ended, and says in the log why it did. True:
+  /// nobody meant to end it, and it may be resumed.
+  [[nodiscard]] bool note_detached(const DetachedEvent& event);
   /// The log says that more records come over it than there is room for. REQUIRES: peer().
   void warn_of_crowding() const;
   [[nodiscard]] bool connected() const { return connected_; }
@@ -106,6 +109,14 @@ class HubLink {
 
   /// The other side dialled it, and has given it up.
   [[nodiscard]] bool is_over() const { return !connected_ && !place && !is_dialled(); }
+  /// When that was first seen. REQUIRES: is_over().
+  [[nodiscard]] std::chrono::milliseconds over_since(std::chrono::milliseconds now) {
+    return *(over_since_ = over_since_.value_or(now));
+  }
+  /// When an ended link is to be forgotten; 0: its end was not seen yet.
+  [[nodiscard]] std::chrono::milliseconds forget_at() const {
+    return over_since_ ? *over_since_ + kEndedShown : std::chrono::milliseconds{0};
+  }
 
   // Dialling. REQUIRES: is_dialled().
   [[nodiscard]] std::optional<std::chrono::milliseconds> dial_at() const { return dial_at_; }
@@ -157,6 +168,7 @@ class HubLink {
   std::optional<std::chrono::milliseconds> resume_until_;
   std::optional<std::chrono::milliseconds> dial_at_;
   std::optional<std::chrono::milliseconds> damped_until_;
+  std::optional<std::chrono::milliseconds> over_since_;
   /// Under the same instance, within kBreaksWithin. Limit: the breaks of a minute, at least 50 ms
   /// apart.
   std::deque<std::chrono::milliseconds> breaks_;

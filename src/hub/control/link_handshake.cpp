@@ -1,8 +1,7 @@
 #include "hub/control/link_handshake.hpp"
 
 #include <string>
-
-#include "hub/shard/commands.hpp"
+#include <utility>
 
 namespace gimnet::hub {
 
@@ -90,10 +89,26 @@ proto::Welcome LinkHandshake::welcome(const proto::HubIntroduction& said, const 
   welcome.frame_length_max = static_cast<std::uint32_t>(parts_.limits.frame_bytes);
   welcome.hub_time_ns = wall_ns;
   welcome.introduction = introduce(terms);
+  welcome.introduction->counts = said.counts;
   return welcome;
 }
 
-proto::Hello LinkHandshake::hello_for(const HubLink& link) const {
+AttachCommand LinkHandshake::accept(Stranger& stranger, const proto::Hello& hello,
+                                    const proto::HubIntroduction& said,
+                                    std::int64_t wall_ns) const {
+  AttachCommand command;
+  command.transport = std::move(stranger.transport);
+  command.resume_wanted = hello.resume;
+  command.peer_epoch = hello.epoch;
+  command.known_hub_epoch = hello.resume_epoch;
+  command.known_taken = hello.resume_taken;
+  command.peer_resume_bytes = hello.resume_buffer_bytes;
+  command.peer_frame_bytes = hello.frame_length_max;
+  command.welcome = welcome(said, parts_.options.accepted, wall_ns);
+  return command;
+}
+
+proto::Hello LinkHandshake::hello_for(const HubLink& link, std::uint64_t counts) const {
   proto::Hello hello;
   hello.role = proto::Role::hub;
   hello.resume = true;
@@ -105,6 +120,7 @@ proto::Hello LinkHandshake::hello_for(const HubLink& link) const {
   hello.introduction = introduce(link.dialled().terms);
   hello.introduction->link_name = link.name();
   hello.introduction->cost = link.dialled().cost;
+  hello.introduction->counts = counts;
   return hello;
 }
 

@@ -9,6 +9,7 @@
 #include "hub/control/hub_link.hpp"
 #include "hub/limits.hpp"
 #include "hub/network/state/network_state.hpp"
+#include "hub/shard/commands.hpp"
 #include "proto/control/link.hpp"
 
 namespace gimnet::hub {
@@ -25,11 +26,15 @@ class LinkHandshake {
   };
   explicit LinkHandshake(const Parts& parts) : parts_(parts) {}
 
+  /// The connection of a stranger who may link; `said`: what WELCOME answers.
+  [[nodiscard]] AttachCommand accept(Stranger& stranger, const proto::Hello& hello,
+                                     const proto::HubIntroduction& said,
+                                     std::int64_t wall_ns) const;
   [[nodiscard]] proto::HubIntroduction introduce(const LinkTerms& terms) const;
   [[nodiscard]] proto::Welcome welcome(const proto::HubIntroduction& said, const LinkTerms& terms,
                                        std::int64_t wall_ns) const;
-  /// REQUIRES: link.is_dialled().
-  [[nodiscard]] proto::Hello hello_for(const HubLink& link) const;
+  /// `counts`: the number under which this end counts it. REQUIRES: link.is_dialled().
+  [[nodiscard]] proto::Hello hello_for(const HubLink& link, std::uint64_t counts) const;
   /// Why that stranger may not link, whoever its hub is; nothing: it may.
   [[nodiscard]] std::optional<proto::Goodbye> refusal(const Stranger& stranger,
                                                       const proto::Hello& hello) const;

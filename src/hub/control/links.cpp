@@ -15,12 +15,6 @@ using proto::Goodbye;
 using proto::GoodbyeCode;
 using std::chrono::milliseconds;
 
-/// A connection that nobody meant to end: it may be resumed.
-bool is_break(const DetachedEvent& event) {
-  return event.code == GoodbyeCode::silent ||
-         (event.code == GoodbyeCode::done && !event.said_by_peer);
-}
-
 }  // namespace
 
 Links::Links(LinksOptions options, const Wiring& wiring)
@@ -40,7 +34,7 @@ std::optional<Goodbye> Links::admit(Stranger& stranger, const proto::Hello& hell
   if (links_.size() >= kLinksMax)
     return Goodbye{GoodbyeCode::hub_full, "this hub has as many links as there can be"};
   if (auto refused = judge(*hello.introduction, moment)) return refused;
-  const proto::HubIntroduction& said = *hello.introduction;
+  proto::HubIntroduction said = *hello.introduction;
   HubLink* link = nullptr;
   for (const auto& [number, each] : links_) {
     const bool same = !each->is_dialled() && each->peer() &&
@@ -53,16 +47,11 @@ std::optional<Goodbye> Links::admit(Stranger& stranger, const proto::Hello& hell
                .first->second.get();
   }
   link->address = stranger.peer.address;
-  AttachCommand command;
-  command.transport = std::move(stranger.transport);
-  command.resume_wanted = hello.resume;
-  command.peer_epoch = hello.epoch;
-  command.known_hub_epoch = hello.resume_epoch;
-  command.known_taken = hello.resume_taken;
-  command.peer_resume_bytes = hello.resume_buffer_bytes;
-  command.peer_frame_bytes = hello.frame_length_max;
-  command.welcome = handshake_.welcome(said, options_.accepted, moment.wall_ns);
-  attach(*link, std::move(command), said, options_.accepted, moment);
+  // Both ends go on with the counts that they have under that number, or both begin anew.
+  if (said.counts == 0 || said.counts != totals_.number_of(link->number()))
+    said.counts = wiring_.random() | 1;  // 0: none
+  attach(*link, handshake_.accept(stranger, hello, said, moment.wall_ns), said, options_.accepted,
+         moment);
   advance(moment);
   return std::nullopt;
 }
@@ -84,7 +73,8 @@ std::optional<Goodbye> Links::judge(const proto::HubIntroduction& said, Moment m
   const HubLink::Alive alive = old->is_alive(moment.now);
   if (alive == HubLink::Alive::yes) answer.admission = LinkAdmission::is_copy;
   if (alive != HubLink::Alive::no) return handshake_.refusal_of(said, answer);
-  close(*old, GoodbyeCode::replaced, "the hub started again");
+  old->last_error = "the hub started again";
+  close(*old, GoodbyeCode::replaced, old->last_error);
   end_connection(*old, true, moment);
   return std::nullopt;
 }
@@ -98,7 +88,8 @@ void Links::dial_due(HubLink& link, Moment moment) {
     link.peer_epoch = link.taken = 0;
   }
   link.said_epoch = link.epoch;
-  wiring_.dial(link.number(), link.dialled(), handshake_.hello_for(link));
+  wiring_.dial(link.number(), link.dialled(),
+               handshake_.hello_for(link, totals_.number_of(link.number())));
 }
 
 void Links::on_dialled(LinkNumber number, Result<net::Welcomed, net::NetError> outcome,
@@ -160,6 +151,7 @@ void Links::attach(HubLink& link, AttachCommand command, const proto::HubIntrodu
   command.attachment = ++link.attachment;
   command.node = make_id<NodeId>(said.hub.hub, kHubIndex);
   if (!command.link) command.link.emplace();
+  command.link->counts_anew = totals_.count_under(link.number(), said.counts);
   command.link->rule.own = wiring_.facts.id;
   command.link->rule.allow = terms.allow;
   std::ranges::sort(command.link->rule.allow);
@@ -216,8 +208,7 @@ void Links::on_route(const SessionRef& session, std::uint32_t attachment,
 void Links::on_detached(const DetachedEvent& event, Moment moment) {
   HubLink* link = find(event.session);
   if (link == nullptr || !link->connected() || link->attachment != event.attachment) return;
-  link->note_detached(event);
-  end_connection(*link, !is_break(event), moment);
+  end_connection(*link, !link->note_detached(event), moment);
   advance(moment);
 }
 
@@ -236,6 +227,7 @@ void Links::withdraw(HubLink& link) {
   if (!link.place) return;
   const Place place = *std::exchange(link.place, std::nullopt);
   by_generation_.erase(place.generation);
+  totals_.release(link.number(), place.generation);
   // Shards stop to look the link up before it goes.
   publish_routes();
   wiring_.shards.send(place.shard, ReleaseCommand{ref_of(place)});
@@ -249,10 +241,8 @@ void Links::close(const HubLink& link, GoodbyeCode code, std::string sentence) {
 }
 
 void Links::tick(Moment moment) {
-  std::vector<LinkNumber> gone;
   for (const auto& [number, link] : links_) {
     if (link->resume_until() && *link->resume_until() <= moment.now) withdraw(*link);
-    if (link->is_over()) gone.push_back(number);
     if (link->damped_until() && *link->damped_until() <= moment.now) {
       link->end_damping();
       network_.set_damped(number, false);
@@ -263,8 +253,19 @@ void Links::tick(Moment moment) {
            proto::encode(link->say_keep_alive(network_.digest(), moment.now, moment.wall_ns)));
     }
   }
-  for (const LinkNumber number : gone) links_.erase(number);
+  forget_ended(moment);
   advance(moment);
+}
+
+void Links::forget_ended(Moment moment) {
+  std::vector<std::pair<milliseconds, LinkNumber>> ended;
+  for (const auto& [number, link] : links_)
+    if (link->is_over()) ended.emplace_back(link->over_since(moment.now), number);
+  std::ranges::sort(ended);
+  for (std::size_t i = 0; i < ended.size(); ++i) {
+    const auto& [since, number] = ended[i];
+    if (ended.size() - i > kEndedMost || since + HubLink::kEndedShown <= moment.now) forget(number);
+  }
 }
 
 std::optional<milliseconds> Links::next_deadline() const {
@@ -277,7 +278,8 @@ std::optional<milliseconds> Links::next_deadline() const {
     note(link->resume_until());
     note(link->damped_until());
     if (!draining_) note(link->dial_at());
-    if (link->connected() || link->is_over()) note(link->keep_alive_at());
+    if (link->connected()) note(link->keep_alive_at());
+    if (link->is_over()) note(link->forget_at());
   }
   return due;
 }
@@ -370,7 +372,7 @@ std::string Links::remove(std::string_view name) {
   if (!link->is_dialled()) return "the other side dials that link; remove it there";
   close(*link, GoodbyeCode::done, "an administrator of the other hub removed the link");
   withdraw(*link);
-  links_.erase(link->number());
+  forget(link->number());
   return {};
 }
 

@@ -17,6 +17,7 @@
 #include "hub/control/hub_facts.hpp"
 #include "hub/control/hub_link.hpp"
 #include "hub/control/link_handshake.hpp"
+#include "hub/control/link_totals.hpp"
 #include "hub/control/network_names.hpp"
 #include "hub/control/next_hops.hpp"
 #include "hub/control/shard_proxy.hpp"
@@ -34,6 +35,8 @@ namespace gimnet::hub {
 class Links {
  public:
   static constexpr std::size_t kLinksMax = 4'093;
+  /// Of links that the other side gave up the latest are shown.
+  static constexpr std::size_t kEndedMost = 64;
   /// A hub that began anew gives way to no other hub before: whoever may link could end it at will.
   static constexpr std::chrono::milliseconds kRedrawPause = std::chrono::minutes(1);
 
@@ -66,6 +69,9 @@ class Links {
   void on_route(const SessionRef& session, std::uint32_t attachment,
                 std::span<const std::byte> payload, Moment moment);
   void on_detached(const DetachedEvent& event, Moment moment);
+  void on_released(const ReleasedEvent& event) {
+    totals_.add(event.session.generation, event.counts);
+  }
   void tick(Moment moment);
   [[nodiscard]] std::optional<std::chrono::milliseconds> next_deadline() const;
   /// No link is dialled or taken any more.
@@ -78,6 +84,8 @@ class Links {
 
   [[nodiscard]] NextHops& next_hops() { return next_hops_; }
   [[nodiscard]] const NetworkState& network() const { return network_; }
+  /// Of sessions of links that have ended.
+  [[nodiscard]] const LinkTotals& totals() const { return totals_; }
   /// Says what is due, and publishes what follows from it.
   void advance(Moment moment);
 
@@ -98,6 +106,11 @@ class Links {
   void end_connection(HubLink& link, bool at_once, Moment moment);
   /// Its routes go, and what waits for it is lost.
   void withdraw(HubLink& link);
+  void forget_ended(Moment moment);
+  void forget(LinkNumber number) {
+    totals_.forget(number);
+    links_.erase(number);
+  }
   void close(const HubLink& link, proto::GoodbyeCode code, std::string sentence);
   void send_all(std::span<const Sending> sendings);
   /// Nothing happens where the id is a configured one.
@@ -123,6 +136,7 @@ class Links {
   std::uint64_t map_seen_ = 0;     ///< the map that the names were told of
   std::map<LinkNumber, std::unique_ptr<HubLink>> links_;
   std::map<std::uint32_t, LinkNumber> by_generation_;  ///< of those with a place
+  LinkTotals totals_;
   std::uint32_t last_number_ = 0;
   bool draining_ = false;
   std::optional<HubId> redrawn_;

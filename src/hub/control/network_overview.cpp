@@ -76,6 +76,7 @@ std::vector<NetworkView::Count> NetworkOverview::not_taken() const {
 }
 
 LinkState NetworkOverview::state_of(const HubLink& link) const {
+  if (link.is_over()) return LinkState::ended;
   if (!link.connected()) return link.resume_until() ? LinkState::away : LinkState::dialling;
   if (!parts_.links.network().is_up(link.number())) return LinkState::learning;
   if (link.damped_until()) return LinkState::damped;
@@ -99,15 +100,18 @@ LinkView NetworkOverview::view_of(const HubLink& link) const {
       std::chrono::ceil<std::chrono::microseconds>(clock.round_trip_least).count());
   view.clock_offset_ns = clock.ahead.count();
   view.clock_error_ns = clock.error.count();
-  if (!link.place || link.place->shard.value() >= parts_.sessions.size()) return view;
-  const SessionCounts counts =
-      parts_.sessions[link.place->shard.value()]->counts(link.place->slot, link.place->generation);
+  SessionCounts counts = parts_.links.totals().of(link.number());
+  if (link.place && link.place->shard.value() < parts_.sessions.size()) {
+    counts += parts_.sessions[link.place->shard.value()]->counts(link.place->slot,
+                                                                 link.place->generation);
+  }
   view.queued_bytes = counts.queued_bytes;
   view.sent_bytes = counts.sent_bytes;
   view.received_bytes = counts.received_bytes;
   view.accepted = counts.accepted;
   view.delivered = counts.delivered;
   view.dropped = counts.dropped;
+  view.unsure = counts.unsure;
   return view;
 }
 

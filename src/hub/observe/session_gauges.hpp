@@ -22,6 +22,13 @@ struct SessionCounters {
   Counter delivered;  ///< frames handed to the kernel for it, or confirmed where resume is on
   Counter sent_bytes;
   Counter dropped;  ///< frames that were for it
+  Counter unsure;   ///< of these, those that a broken link may have delivered
+
+  /// All counts are 0 again.
+  void clear() {
+    for (Counter* each : {&accepted, &received_bytes, &delivered, &sent_bytes, &dropped, &unsure})
+      each->store(0);
+  }
 };
 
 /// The same and what waits for it, in bytes, as numbers of one moment.
@@ -32,6 +39,18 @@ struct SessionCounts {
   std::uint64_t delivered = 0;
   std::uint64_t sent_bytes = 0;
   std::uint64_t dropped = 0;
+  std::uint64_t unsure = 0;
+
+  SessionCounts& operator+=(const SessionCounts& other) {
+    queued_bytes += other.queued_bytes;
+    accepted += other.accepted;
+    received_bytes += other.received_bytes;
+    delivered += other.delivered;
+    sent_bytes += other.sent_bytes;
+    dropped += other.dropped;
+    unsure += other.unsure;
+    return *this;
+  }
 };
 
 /// Lets others read the state of each session of a shard. Thread safety: counts() from the thread
@@ -46,11 +65,7 @@ class SessionGauges {
   [[nodiscard]] SessionCounters& begin(ConnectionSlot slot, std::uint32_t generation) {
     if (!counters_ || slot.value() >= slots_) return beyond_;
     SessionCounters& counters = counters_[slot.value()];
-    counters.accepted.store(0);
-    counters.received_bytes.store(0);
-    counters.delivered.store(0);
-    counters.sent_bytes.store(0);
-    counters.dropped.store(0);
+    counters.clear();
     set_queued(slot, 0);
     // release pairs with the acquire in counts(): who sees the session sees nothing of the one
     // before.
@@ -73,7 +88,8 @@ class SessionGauges {
     if (counters.generation.load(std::memory_order_acquire) != generation) return {};
     return {queued_[slot.value()].value(),   counters.accepted.value(),
             counters.received_bytes.value(), counters.delivered.value(),
-            counters.sent_bytes.value(),     counters.dropped.value()};
+            counters.sent_bytes.value(),     counters.dropped.value(),
+            counters.unsure.value()};
   }
 
  private:

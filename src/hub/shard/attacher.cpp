@@ -154,6 +154,10 @@ void Attacher::begin_anew(Connection& connection, const AttachCommand& command,
   connection.outbox.set_resume(nullptr);
   connection.resume.reset();
   count_anew(connection);
+  if (command.link && command.link->counts_anew) {
+    connection.sent_bytes = 0;
+    connection.outbox.counters()->clear();
+  }
   if (!command.resume_wanted) return;
   connection.resume = std::make_unique<ResumeState>(resume_bytes(connection));
   connection.outbox.set_resume(&connection.resume->kept);

@@ -124,11 +124,13 @@ void Closer::tell(const Connection& connection, bool said_by_peer, proto::Goodby
 
 void Closer::lose_unconfirmed(Connection& connection, const Run& partial) {
   std::uint64_t lost = 0;
+  std::uint64_t may_have_arrived = 0;
   // The hub at the other end of a link goes on: a frame may have arrived there.
   const auto unsure =
       connection.is_link() ? proto::DropReason::link_unsure : proto::DropReason::link_lost;
   const auto lose = [&](const Run& run, proto::DropReason reason) {
     lost += run.frames;
+    if (reason == proto::DropReason::link_unsure) may_have_arrived += run.frames;
     state_.drops.drop_mixed(run.bytes, run.size, reason);
   };
   if (connection.resume) {
@@ -136,9 +138,11 @@ void Closer::lose_unconfirmed(Connection& connection, const Run& partial) {
         connection.resume->kept.clear([&](const Run& run) { lose(run, unsure); });
     state_.tally.drop(unsure, let_go);
     lost += let_go;
+    if (connection.is_link()) may_have_arrived += let_go;
   }
   if (partial.frames != 0) lose(partial, proto::DropReason::link_lost);
   connection.outbox.count_dropped(lost);
+  connection.outbox.counters()->unsure.add(may_have_arrived);
   state_.tally.queued -= static_cast<std::int64_t>(lost);
 }
 
@@ -151,6 +155,11 @@ void Closer::release(SessionRef session) {
   }
   lose_unconfirmed(*connection, connection->writer.take_partial());
   connection->outbox.drop_all(proto::DropReason::link_lost, state_.egress);
+  if (connection->is_link()) {
+    state_.tell_conductor(
+        {state_.self,
+         ReleasedEvent{session, state_.sessions.counts(session.slot, session.generation)}});
+  }
   state_.pacer.forget(*connection);
   state_.retained.forget_provider(connection->node);
   state_.sessions.set_queued(connection->slot, 0);

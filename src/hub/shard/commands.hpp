@@ -18,6 +18,7 @@
 #include "hub/data/fanout/paced_subscription.hpp"
 #include "hub/data/ingress/ingress_gate.hpp"
 #include "hub/limits.hpp"
+#include "hub/observe/session_gauges.hpp"
 #include "net/stream.hpp"
 #include "proto/control/link.hpp"
 #include "proto/frame/flow.hpp"
@@ -66,6 +67,7 @@ struct LinkAttach {
   bool dialled = false;
   bool resumed = false;
   std::uint64_t epoch = 0;
+  bool counts_anew = false;  ///< the counts of the session begin at 0, if it is not resumed
 };
 
 /// An admitted connection for a session, new or come back. The shard fences the session's earlier
@@ -242,6 +244,12 @@ struct DetachedEvent {
   std::uint64_t taken = 0;       ///< data frames from the other end
 };
 
+/// The session of a link was released, and came to that in the end.
+struct ReleasedEvent {
+  SessionRef session;
+  SessionCounts counts;
+};
+
 /// Events for a connection were dropped, because its control queue was half full; now it is empty.
 /// More are dropped until the TellAgainCommand that answers this.
 struct EventsMissedEvent {
@@ -269,8 +277,8 @@ struct DrainedEvent {};
 
 struct ShardEvent {
   ShardIndex shard;
-  std::variant<ControlFrameEvent, DetachedEvent, EventsMissedEvent, MissedEvent, FarewellEvent,
-               DrainedEvent>
+  std::variant<ControlFrameEvent, DetachedEvent, ReleasedEvent, EventsMissedEvent, MissedEvent,
+               FarewellEvent, DrainedEvent>
       what;
 };
 

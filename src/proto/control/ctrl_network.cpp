@@ -115,6 +115,8 @@ const char* link_state_name(LinkState state) {
       return "damped";
     case LinkState::up:
       return "up";
+    case LinkState::ended:
+      return "ended";
   }
   return "unknown";
 }

@@ -81,11 +81,12 @@ enum class LinkState : std::uint16_t {
   standby = 3,   ///< up, while another link to the same hub carries
   damped = 4,    ///< up, and not reported yet, since it broke too often
   up = 5,
+  ended = 6,  ///< the other side dialled it, and does so no more
 };
 /// The state as documents and tools print it, for example "up"; "unknown" for another value.
 [[nodiscard]] const char* link_state_name(LinkState state);
 
-/// Counts of a link; but for the first, over all its connections.
+/// Counts of a link; but for the first, over all its connections, since both hubs began to count.
 struct LinkCounts {
   std::uint64_t queued_bytes = 0;
   std::uint64_t sent_bytes = 0;

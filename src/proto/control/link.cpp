@@ -69,6 +69,7 @@ enum : std::uint32_t {
   keep_alive_ms,
   silent_ms,
   features_required,
+  counts,
 };
 }  // namespace introduction_key
 
@@ -85,6 +86,7 @@ void write_introduction(bitestream::Writer& writer, const HubIntroduction& said)
   writer.put_u32(key::keep_alive_ms, said.keep_alive_ms);
   writer.put_u32(key::silent_ms, said.silent_ms);
   if (said.features_required != 0) writer.put_u64(key::features_required, said.features_required);
+  if (said.counts != 0) writer.put_u64(key::counts, said.counts);
 }
 
 std::optional<HubIntroduction> read_introduction(Fields& fields) {
@@ -111,6 +113,7 @@ std::optional<HubIntroduction> read_introduction(Fields& fields) {
   said.silent_ms = fields.number<std::uint32_t>(key::silent_ms, "silent time", 0);
   said.features_required =
       fields.number<std::uint64_t>(key::features_required, "required feature set", 0);
+  said.counts = fields.number<std::uint64_t>(key::counts, "number of its counts", 0);
   return said;
 }
 

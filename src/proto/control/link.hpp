@@ -55,6 +55,8 @@ struct HubIntroduction {
   std::uint32_t keep_alive_ms = 0;
   std::uint32_t silent_ms = 0;
   std::uint64_t features_required = 0;
+  /// The number under which its counts of the link go on, or in WELCOME begin; 0: none.
+  std::uint64_t counts = 0;
   friend bool operator==(const HubIntroduction&, const HubIntroduction&) = default;
 };
 

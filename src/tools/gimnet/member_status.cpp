@@ -15,14 +15,16 @@ namespace {
 
 bool has_error(const MemberStatus& member) { return !member.error.empty(); }
 
-/// The record that the hub at the other end has of the same link; nullptr: none.
+constexpr std::string_view kEnded = "ended";
+
+/// The record that the hub at the other end has of the same link; nullptr: none that stands.
 const LinkRecord* other_end(const std::vector<MemberStatus>& members, std::uint32_t hub,
                             const LinkRecord& link) {
   const auto other = std::ranges::find(members, link.hub_id, &MemberStatus::hub_id);
   if (other == members.end()) return nullptr;
   const auto same = std::ranges::find_if(other->links, [&](const LinkRecord& candidate) {
     return candidate.hub_id == hub && candidate.name == link.name &&
-           candidate.dialled != link.dialled;
+           candidate.dialled != link.dialled && candidate.state != kEnded;
   });
   return same == other->links.end() ? nullptr : &*same;
 }
@@ -33,8 +35,10 @@ bool links_agree(const std::vector<MemberStatus>& members) {
   for (const MemberStatus& member : members) {
     if (has_error(member)) return false;
     for (const LinkRecord& link : member.links) {
-      if (link.hub_id == 0) continue;  // it never came about
+      // The one never came about, the other is no more.
+      if (link.hub_id == 0 || link.state == kEnded) continue;
       const LinkRecord* const other = other_end(members, member.hub_id, link);
+      if (other == nullptr && link.state == "dialling") continue;
       if (other == nullptr || link.delivered > other->accepted ||
           other->accepted > link.delivered + link.unsure)
         return false;

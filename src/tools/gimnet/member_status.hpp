@@ -22,7 +22,7 @@ struct MemberStatus {
   std::string error;  ///< why it told nothing, such as "unreachable"; "": it told
 };
 /// Is delivered(A) <= accepted(B) <= delivered(A) + unsure(A) true for each link, in both ways? A
-/// link is found at both ends by its name.
+/// link is found at both ends by its name. One that stands at no end is not compared.
 [[nodiscard]] bool links_agree(const std::vector<MemberStatus>& members);
 [[nodiscard]] std::string json_of(const std::vector<MemberStatus>& members, bool exact);
 [[nodiscard]] std::string text_of(const std::vector<MemberStatus>& members, bool exact,

@@ -62,7 +62,7 @@ TEST(LinkHandshake, TheLongestHelloFits) {
   rig.facts.version = std::string(300, 'v');
   DialledLink to = LinkRig::dialling(std::string(255, 'l'), 65'535).dial.front();
   const HubLink link(LinkNumber{1}, to);
-  const auto bytes = net::encode_hello(rig.handshake.hello_for(link));
+  const auto bytes = net::encode_hello(rig.handshake.hello_for(link, UINT64_MAX));
   EXPECT_LE(bytes.size(), proto::kAdmissionBytesMax);
 }
 

@@ -273,13 +273,101 @@ TEST(Links, TheLastOneThatIsRemovedLeavesNobodyReachable) {
   EXPECT_EQ(hubs.b.links.network().map().reachable().size(), 1u);
 }
 
-TEST(Links, OneThatTheOtherSideGaveUpIsForgotten) {
+TEST(Links, OneThatTheOtherSideGaveUpIsShownForAWhile) {
   LinkedRigs hubs;
   hubs.link();
   hubs.a.detach(hubs.a.attached(), GoodbyeCode::done, true);
+  hubs.a.pass(milliseconds{1});
+  ASSERT_THAT(hubs.a.links.all(), ::testing::SizeIs(1));
+  EXPECT_TRUE(hubs.a.links.all().begin()->second->is_over());
+  hubs.a.pass(HubLink::kEndedShown - milliseconds{1});
+  EXPECT_THAT(hubs.a.links.all(), ::testing::SizeIs(1));
   ASSERT_TRUE(hubs.a.links.next_deadline()) << "nothing else may come for long";
+  EXPECT_LE(*hubs.a.links.next_deadline(), hubs.a.now + milliseconds{1});
   hubs.a.pass(milliseconds{1});
   EXPECT_TRUE(hubs.a.links.all().empty());
+}
+
+TEST(Links, OfThoseThatEndedTheLatestAreShown) {
+  LinkedRigs hubs;
+  hubs.b.links.tick(hubs.b.moment());
+  proto::Hello hello = hubs.b.dialled.back().hello;
+  const auto begin_and_end = [&](std::size_t number) {
+    hello.introduction->link_name = "link" + std::to_string(number);
+    ASSERT_FALSE(hubs.a.admit(hello));
+    hubs.a.detach(hubs.a.attached(), GoodbyeCode::done, true);
+    hubs.a.pass(milliseconds{1});
+  };
+  for (std::size_t number = 0; number < Links::kEndedMost + 2; ++number) begin_and_end(number);
+  ASSERT_THAT(hubs.a.links.all(), ::testing::SizeIs(Links::kEndedMost));
+  EXPECT_EQ(hubs.a.links.all().begin()->second->name(), "link2");
+  begin_and_end(2);
+  EXPECT_THAT(hubs.a.links.all(), ::testing::SizeIs(Links::kEndedMost)) << "it came back";
+}
+
+/// Its only link.
+const HubLink& only_link(const LinkRig& rig) { return *rig.links.all().begin()->second; }
+
+/// The dialling end withdraws the link, whose session then came to that.
+void withdraw_at_b(LinkedRigs& hubs, const SessionCounts& counts) {
+  const SessionRef session = hubs.b.attached().session;
+  hubs.b.detach(hubs.b.attached());
+  hubs.b.pass(HubLink::kResumeTime);
+  hubs.b.links.on_released({session, counts});
+}
+
+TEST(Links, CountsGoOnAtBothEndsWhereOneWithdrewTheLink) {
+  LinkedRigs hubs;
+  hubs.connect();
+  EXPECT_TRUE(hubs.a.attached().link->counts_anew && hubs.b.attached().link->counts_anew);
+  hubs.carry();
+  for (std::uint64_t times = 1; times <= 2; ++times) {
+    SessionCounts counts;
+    counts.delivered = 5;
+    counts.unsure = 1;
+    withdraw_at_b(hubs, counts);
+    hubs.connect();
+    EXPECT_FALSE(hubs.a.attached().link->counts_anew);
+    EXPECT_FALSE(hubs.b.attached().link->counts_anew);
+    const SessionCounts total = hubs.b.links.totals().of(only_link(hubs.b).number());
+    EXPECT_EQ(total.delivered, 5 * times);
+    EXPECT_EQ(total.unsure, times);
+  }
+}
+
+TEST(Links, CountsBeginAnewAtBothEndsWhereOneHubStartedAgain) {
+  LinkedRigs hubs;
+  hubs.link();
+  SessionCounts counts;
+  counts.delivered = 5;
+  withdraw_at_b(hubs, counts);
+  hubs.b.pass(milliseconds{1'000});
+  LinkRig again(1, LinkRig::accepting(), 777);
+  again.random = 1'000;
+  ASSERT_FALSE(again.admit(hubs.b.dialled.back().hello));
+  EXPECT_TRUE(again.attached().link->counts_anew);
+  hubs.b.links.on_dialled(hubs.b.dialled.back().link,
+                          net::Welcomed{std::make_unique<NoStream>(), again.attached().welcome},
+                          hubs.b.moment());
+  EXPECT_TRUE(hubs.b.attached().link->counts_anew);
+  EXPECT_EQ(hubs.b.links.totals().of(only_link(hubs.b).number()).delivered, 0u);
+}
+
+TEST(Links, CountsOfASessionThatEndedBeforeTheyBeganAnewAreDropped) {
+  LinkedRigs hubs;
+  hubs.link();
+  const SessionRef session = hubs.b.attached().session;
+  hubs.b.detach(hubs.b.attached());
+  hubs.b.pass(HubLink::kResumeTime);
+  hubs.b.pass(milliseconds{1'000});
+  proto::Welcome welcome = hubs.a.attached().welcome;
+  welcome.introduction->counts += 2;
+  hubs.b.links.on_dialled(hubs.b.dialled.back().link,
+                          net::Welcomed{std::make_unique<NoStream>(), welcome}, hubs.b.moment());
+  SessionCounts counts;
+  counts.delivered = 5;
+  hubs.b.links.on_released({session, counts});
+  EXPECT_EQ(hubs.b.links.totals().of(only_link(hubs.b).number()).delivered, 0u);
 }
 
 TEST(Links, KeepAlivesMeasureTheRoundTripAndTheOtherClock) {

@@ -42,6 +42,24 @@ TEST(NetworkOverview, ShowsHubsAndLinksOfBothEnds) {
   EXPECT_FALSE(at_a.hubs()[1].reachable);
 }
 
+TEST(NetworkOverview, ShowsALinkThatTheOtherSideGaveUpWithItsCounts) {
+  LinkedRigs hubs;
+  const NetworkOverview at_a({hubs.a.facts, hubs.a.links, hubs.a.names, hubs.a.groups, {}});
+  hubs.link();
+  const SessionRef session = hubs.a.attached().session;
+  hubs.a.detach(hubs.a.attached(), proto::GoodbyeCode::draining, true);
+  hubs.a.pass(milliseconds{1});
+  SessionCounts counts;
+  counts.accepted = 3;
+  counts.unsure = 2;
+  hubs.a.links.on_released({session, counts});
+  ASSERT_EQ(at_a.links().size(), 1u);
+  EXPECT_EQ(at_a.links()[0].state, LinkState::ended);
+  EXPECT_EQ(at_a.links()[0].last_error, "the other hub said goodbye: draining");
+  EXPECT_EQ(at_a.links()[0].accepted, 3u);
+  EXPECT_EQ(at_a.links()[0].unsure, 2u);
+}
+
 TEST(NetworkOverview, CountsWhatCameOverLinksAndWasNotTaken) {
   LinkedRigs hubs;
   const NetworkOverview at_a({hubs.a.facts, hubs.a.links, hubs.a.names, hubs.a.groups, {}});

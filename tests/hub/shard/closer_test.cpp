@@ -145,6 +145,28 @@ TEST(Closer, AReleasedSessionTakesEverythingWithIt) {
   EXPECT_EQ(rig.dropped(DropReason::no_such_node), 1u);
 }
 
+TEST(Closer, TellsWhatTheSessionOfALinkCameTo) {
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  FakeNode& link = rig.link(0, HubId{9}, {.resume = true});
+  rig.send(link, a.id.value(), "from it", {.src = make_id<NodeId>(HubId{9}, 5).value()});
+  for (int i = 0; i < 3; ++i) rig.send(a, make_id<NodeId>(HubId{9}, 5).value(), "for it");
+  rig.settle();
+  rig.send_flow(link, proto::flow::Confirm{1});
+  rig.settle();
+  rig.release(link);
+  rig.settle();
+  const auto events = rig.take_events();
+  ASSERT_EQ(events.size(), 1u);
+  const auto* released = std::get_if<ReleasedEvent>(&events[0].what);
+  ASSERT_NE(released, nullptr);
+  EXPECT_EQ(released->session.generation, link.session.generation);
+  EXPECT_EQ(released->counts.accepted, 1u);
+  EXPECT_EQ(released->counts.delivered, 1u);
+  EXPECT_EQ(released->counts.dropped, 2u);
+  EXPECT_EQ(released->counts.unsure, 2u) << "written, and not confirmed";
+}
+
 TEST(Closer, TellsSendersWhatAResumeBufferLost) {
   for (const bool comes_back_anew : {false, true}) {
     HubRig rig;

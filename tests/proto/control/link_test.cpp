@@ -96,6 +96,28 @@ TEST(HelloMessage, FitsInTheAdmissionBuffer) {
   EXPECT_LE(kOpeningSize + kHeaderSize + encode(hello).size(), kAdmissionBytesMax);
 }
 
+TEST(HubIntroduction, ComesAsItWasSent) {
+  HubIntroduction said;
+  said.hub.hub = HubId{9};
+  said.instance = HubInstance{77};
+  said.configured = true;
+  said.link_name = "up";
+  said.cost = 40;
+  said.keep_alive_ms = 250;
+  said.silent_ms = 1'000;
+  for (const std::uint64_t counts : {std::uint64_t{0}, UINT64_MAX}) {
+    said.counts = counts;
+    Hello hello;
+    hello.introduction = said;
+    EXPECT_EQ(decode<Hello>(encode(hello))->introduction, said);
+    Welcome welcome;
+    welcome.node = NodeId{9};
+    welcome.hub = HubId{9};
+    welcome.introduction = said;
+    EXPECT_EQ(decode<Welcome>(encode(welcome))->introduction, said);
+  }
+}
+
 TEST(WelcomeMessage, IsDecodedAndWrittenAsTheVectorSays) {
   Welcome welcome;
   welcome.node = NodeId{0x00700011};

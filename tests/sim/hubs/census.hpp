@@ -34,13 +34,15 @@ enum class Event : std::uint8_t {
   lost_name,
   paused_sender,
   asked_another_hub,
+  counted_on,
 };
-inline constexpr std::array<std::string_view, 25> kEventNames = {
+inline constexpr std::array<std::string_view, 26> kEventNames = {
     "stalled",      "reset",        "cut",        "one_way",       "partition",
     "killed",       "lost_power",   "lost_state", "drained",       "stopped",
     "clock_jump",   "link_removed", "link_added", "other_cost",    "node_crashed",
     "moved",        "resumed",      "unsure",     "no_route",      "id_collision",
-    "copied_state", "refused_name", "lost_name",  "paused_sender", "asked_another_hub"};
+    "copied_state", "refused_name", "lost_name",  "paused_sender", "asked_another_hub",
+    "counted_on"};
 
 /// Counts of each. Thread safety: none.
 class Census {

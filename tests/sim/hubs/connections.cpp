@@ -171,7 +171,8 @@ const hub::HubLink* World::find_link(std::size_t wire, std::size_t end) const {
   const std::string name = link_of(wire).name;
   if (machine.hub == nullptr) return nullptr;
   for (const auto& [number, link] : machine.hub->links().all())
-    if (link->name() == name && link->is_dialled() == (end == 0)) return link.get();
+    if (!link->is_over() && link->name() == name && link->is_dialled() == (end == 0))
+      return link.get();
   return nullptr;
 }
 

@@ -52,6 +52,25 @@ TEST(MemberStatus, ALinkThatCannotBeComparedDoesNotAgree) {
   EXPECT_TRUE(links_agree(members)) << "it never came about";
 }
 
+TEST(MemberStatus, ALinkThatDoesNotStandIsNotCompared) {
+  std::vector<MemberStatus> members = two_members();
+  members[1].links[0].state = "ended";
+  members[1].links[0].accepted = 9;
+  EXPECT_FALSE(links_agree(members)) << "the other end stands";
+  members[0].links[0].state = "dialling";
+  EXPECT_TRUE(links_agree(members));
+  members[1].links.clear();
+  EXPECT_TRUE(links_agree(members)) << "its hub started again";
+}
+
+TEST(MemberStatus, ALinkThatEndedDoesNotHideItsSuccessor) {
+  std::vector<MemberStatus> members = two_members();
+  members[1].links.insert(members[1].links.begin(), members[1].links[0]);
+  members[1].links[0].state = "ended";
+  members[1].links[0].accepted = 9;
+  EXPECT_TRUE(links_agree(members));
+}
+
 TEST(MemberStatus, IsAnObjectWithLedgersAndLinks) {
   std::vector<MemberStatus> members = two_members();
   members[1].error = "no answer";
