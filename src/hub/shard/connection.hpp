@@ -102,6 +102,7 @@ struct ResumeState {
   std::uint64_t taken_told = 0;         ///< of them, in the last CONFIRM
   std::uint64_t bytes_since_told = 0;   ///< taken since the last CONFIRM
   std::uint32_t peer_resume_bytes = 0;  ///< a quarter of it without a CONFIRM is too much
+  bool confirm_due = false;             ///< it stands in ShardState::confirms
 };
 
 /// The hub at the other end of a link.

@@ -1,6 +1,7 @@
 #include "hub/shard/flow_words.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "base/clock.hpp"
 
@@ -18,12 +19,17 @@ void send_flow(ShardState& state, Connection& connection, const proto::flow::Mes
 
 void send_confirm(ShardState& state, Connection& connection) {
   ResumeState& resume = *connection.resume;
-  if (resume.taken == resume.taken_told) return;
+  if (resume.taken == resume.taken_told || std::exchange(resume.confirm_due, true)) return;
+  state.confirms.push_back(connection.session());
+}
+
+bool push_confirm(ShardState& state, Connection& connection) {
+  ResumeState& resume = *connection.resume;
   // Without room it is said with what is taken next, at the next PING, or with keep-alive.
-  if (!push_flow(state, connection, proto::flow::Confirm{resume.taken})) return;
+  if (!push_flow(state, connection, proto::flow::Confirm{resume.taken})) return false;
   resume.taken_told = resume.taken;
   resume.bytes_since_told = 0;
-  state.recipients.mark_dirty(connection);
+  return true;
 }
 
 void note_taken(ShardState& state, Connection& connection, const proto::RunView& view) {

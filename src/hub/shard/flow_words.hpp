@@ -12,8 +12,11 @@
 
 namespace gimnet::hub {
 
-/// Tells the peer how many data frames were taken from it.
+/// Tells the peer how many data frames were taken from it, once this turn has written them to their
+/// recipients.
 void send_confirm(ShardState& state, Connection& connection);
+/// Queues that CONFIRM, to be flushed by the caller; false: no room.
+[[nodiscard]] bool push_confirm(ShardState& state, Connection& connection);
 /// Queues a FLOW frame to the peer of this connection, to be flushed by the caller; false: no room.
 [[nodiscard]] bool push_flow(ShardState& state, Connection& connection,
                              const proto::flow::Message& message);

@@ -30,15 +30,35 @@ bool Flusher::flush_dirty() {
   std::vector<Recipient*>& dirty = state_.recipients.dirty();
   // Flushing may mark others (a sender that is told to go on): they come at the end of the same
   // list.
-  for (std::size_t next = 0; next < dirty.size();) {
-    auto& connection = static_cast<Connection&>(*dirty[next++]);
-    connection.dirty = false;
-    flush(connection);
+  std::size_t next = 0;
+  const auto flush_rest = [&] {
+    while (next < dirty.size()) {
+      auto& connection = static_cast<Connection&>(*dirty[next++]);
+      connection.dirty = false;
+      flush(connection);
+    }
+  };
+  flush_rest();
+  if (!state_.confirms.empty()) {
+    say_confirms();
+    flush_rest();
   }
   dirty.clear();
   for (Connection* connection : again_) state_.recipients.mark_dirty(*connection);
   again_.clear();
   return !dirty.empty();
+}
+
+/// The frames that a CONFIRM counts were handed on before, as far as their recipients take them: if
+/// the hub dies between the two, their sender still has them.
+void Flusher::say_confirms() {
+  for (const SessionRef session : state_.confirms) {
+    Connection* const connection = state_.find(session);
+    if (connection == nullptr || connection->resume == nullptr) continue;
+    connection->resume->confirm_due = false;
+    if (connection->connected && push_confirm(state_, *connection)) flush(*connection);
+  }
+  state_.confirms.clear();
 }
 
 void Flusher::flush(Connection& connection) {

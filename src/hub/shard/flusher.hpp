@@ -29,6 +29,7 @@ class Flusher {
   void look_after(Connection& connection);
 
  private:
+  void say_confirms();
   void ask_for_confirm(Connection& connection);
   void ask_to_be_told(Connection& connection);
   void let_wait(Connection& connection);

@@ -74,6 +74,7 @@ struct ShardState {
   std::vector<std::uint64_t>
       with_rest;  ///< tokens of connections that go on without the poller, by age: their last read
                   ///< was not routed whole, their stream keeps bytes, or they have just come
+  std::vector<SessionRef> confirms;  ///< CONFIRM is due to them, behind what was taken from them
   std::uint64_t now_ms = 0;
   std::uint64_t done_shards = 0;  ///< bit set: they drain, and what they had handed over was taken
   bool nothing_follows =
