@@ -39,6 +39,7 @@ constexpr std::array kCounters{
     GIMNET_COUNTER(pauses),
     GIMNET_COUNTER(resumes),
     GIMNET_COUNTER(reports),
+    GIMNET_COUNTER(reports_lost),
     GIMNET_COUNTER(held_reads),
     GIMNET_COUNTER(untaken_frames),
     GIMNET_COUNTER(gap_frames),

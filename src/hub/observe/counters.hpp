@@ -85,6 +85,7 @@ struct alignas(64) ShardCounters {
   Counter pauses;
   Counter resumes;
   Counter reports;
+  Counter reports_lost;    ///< REPORTs to nodes of other hubs, to which there was no way
   Counter held_reads;      ///< times a sender that ignored PAUSE was not read
   Counter untaken_frames;  ///< read at the hub's end and left to their senders: not accepted, not
                            ///< confirmed

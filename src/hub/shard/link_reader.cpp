@@ -97,7 +97,8 @@ void LinkReader::pass_on_report(const Connection& connection, const proto::RunVi
   const bool back =
       to != state_.shared.hub && state_.shared.routes.find(to).neighbour == hub_of(connection.node);
   const bool too_large = view.size > proto::kHeaderSize + proto::kReportSizeMax;
-  if (back || too_large || header.hops >= proto::kHopsMax) return;
+  if (back || too_large || header.hops >= proto::kHopsMax)
+    return state_.counters.reports_lost.add(1);
   auto* bytes = const_cast<std::byte*>(view.bytes);
   bytes[proto::kHopsOffset] = static_cast<std::byte>(header.hops + 1);
   state_.signals.pass_on({bytes, view.size});

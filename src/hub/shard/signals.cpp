@@ -39,6 +39,8 @@ void Signals::pass_on(std::span<std::byte> frame) {
   const NodeId node{header.dst};
   const bool here = hub_of(node) == state_.shared.hub;
   if (here && header.kind == proto::Kind::flow) set_destination(frame, NodeId{});
+  if (!here && header.kind == proto::Kind::report && !state_.router.place_of(node).exists())
+    return state_.counters.reports_lost.add(1);
   send_control(node, frame);
 }
 
@@ -106,6 +108,9 @@ void Signals::watch_unread(Connection& connection) {
 void Signals::send_reports() {
   if (!state_.drops.pending()) return;
   state_.drops.flush(state_.now_ms, [this](NodeId sender, std::span<const std::byte> payload) {
+    // A link brings frames before the way back to their hub is known.
+    const bool elsewhere = hub_of(sender) != state_.shared.hub;
+    if (elsewhere && !state_.router.place_of(sender).exists()) return false;
     std::byte frame[proto::kHeaderSize + proto::kReportSizeMax];
     proto::FrameHeader header;
     header.length = static_cast<std::uint32_t>(payload.size());
@@ -117,7 +122,9 @@ void Signals::send_reports() {
     std::memcpy(frame + proto::kHeaderSize, payload.data(), payload.size());
     state_.counters.reports.add(1);
     send_control(sender, {frame, header.frame_size()});
+    return true;
   });
+  state_.counters.reports_lost.add(state_.drops.take_lost());
 }
 
 void Signals::arm(Connection& connection) {

@@ -163,6 +163,31 @@ TEST(Signals, MergesReportsWithinTheInterval) {
   EXPECT_EQ(a.reports()[0].count + a.reports()[1].count, 5u);
 }
 
+// A hub that started again gets frames over a link before it knows the way back to their hub.
+TEST(Signals, AReportToAnotherHubWaitsForAWayThere) {
+  for (const bool comes : {true, false}) {
+    HubRig rig;
+    const HubId near{9};
+    FakeNode& link = rig.link(0, near);
+    rig.routes().publish(near, {});
+    rig.send(link, 7u << 20 | 999, "x",
+             {.flags = proto::kFlagReport, .src = make_id<NodeId>(near, 5).value()});
+    rig.settle();
+    EXPECT_THAT(link.reports(), SizeIs(0));
+    if (comes) {
+      const NodePlace place{link.shard, link.session.slot, link.session.generation};
+      rig.routes().publish(near, {place, near});
+    }
+    for (std::uint64_t ms = 0; ms <= DropBook::kKeptMs; ms += 100) {
+      rig.now_ms += 100;
+      rig.turn_shard(0);
+      link.read();
+    }
+    EXPECT_THAT(link.reports(), SizeIs(comes ? 1 : 0));
+    EXPECT_EQ(rig.sum(&ShardCounters::reports_lost), comes ? 0u : 1u);
+  }
+}
+
 // Its silence is not looked at while it is not read: that its machine is gone tells the kernel.
 TEST(Signals, WhoIsNotReadHasToTakeWhatItIsSent) {
   Limits limits;

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "base/ids.hpp"
@@ -42,8 +43,12 @@ class DropBook {
   /// to do.
   [[nodiscard]] bool pending() const { return !notes_.empty(); }
 
+  /// A report that cannot be sent is kept for so long.
+  static constexpr std::uint64_t kKeptMs = 5'000;
+
   /// Calls send(NodeId sender, payload span) for each report that is due, and forgets senders that
-  /// dropped nothing for a while.
+  /// dropped nothing for a while. send() returns whether there is a way to the sender. Without one
+  /// the report waits, and grows, for kKeptMs at most; take_lost() counts it after that.
   template <class Send>
   void flush(std::uint64_t now_ms, Send&& send) {
     const std::size_t before = notes_.size();
@@ -53,9 +58,13 @@ class DropBook {
       if (due && note.count != 0) {
         std::byte payload[proto::kReportSizeMax];
         const std::size_t size = encode(note, payload);
-        note.count = 0;
         note.sent_ms = now_ms;
-        send(note.sender, std::span<const std::byte>(payload, size));
+        const bool sent = send(note.sender, std::span<const std::byte>(payload, size));
+        if (!sent && note.kept_since_ms == 0) note.kept_since_ms = now_ms;
+        const bool kept = !sent && now_ms < note.kept_since_ms + kKeptMs;
+        lost_ += sent || kept ? 0 : 1;
+        if (!kept) note.count = 0;
+        if (!kept) note.kept_since_ms = 0;
       } else if (due) {
         notes_[i] = notes_.back();
         notes_.pop_back();
@@ -66,6 +75,9 @@ class DropBook {
     if (notes_.size() != before) link_all();
   }
 
+  /// Reports that could not be sent, since the last call.
+  [[nodiscard]] std::uint64_t take_lost() { return std::exchange(lost_, 0); }
+
  private:
   struct Note {
     NodeId sender;
@@ -73,6 +85,7 @@ class DropBook {
     std::uint32_t count = 0;
     std::uint32_t next = 0;  ///< number of the next one with the same place; 0: none
     std::uint64_t sent_ms = 0;
+    std::uint64_t kept_since_ms = 0;  ///< without a way to the sender; 0: there is one
     proto::FrameHeader last;
     std::uint8_t following_size = 0;
     std::byte following[proto::kReportFollowingMax];
@@ -98,6 +111,7 @@ class DropBook {
   Tally& tally_;
   const std::uint64_t interval_ms_;
   const std::uint64_t notes_max_;
+  std::uint64_t lost_ = 0;
   std::vector<Note> notes_;  ///< Limit: reports
   std::vector<std::uint32_t>
       heads_;  ///< by place_of(): a note's number, its index + 1; empty before the first

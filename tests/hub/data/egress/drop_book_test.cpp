@@ -22,6 +22,7 @@ std::vector<Sent> flush(DropBook& book, std::uint64_t now_ms) {
   std::vector<Sent> sent;
   book.flush(now_ms, [&](NodeId sender, std::span<const std::byte> payload) {
     sent.push_back({sender, {payload.begin(), payload.end()}});
+    return true;
   });
   return sent;
 }
@@ -137,6 +138,33 @@ TEST(DropBook, SaysNoMoreThanOneAnInterval) {
   EXPECT_EQ(flush(book, 1'009).size(), 0u);
   EXPECT_TRUE(book.pending());
   EXPECT_EQ(flush(book, 1'010).size(), 1u);
+}
+
+TEST(DropBook, KeepsAReportWithoutAWayToItsSenderForAWhile) {
+  Tally tally;
+  DropBook book(tally, 10, 4'096);
+  const auto find_no_way = [&book](std::uint64_t now_ms) {
+    std::size_t asked = 0;
+    book.flush(now_ms, [&asked](NodeId, std::span<const std::byte>) { return ++asked == 0; });
+    return asked;
+  };
+  drop(book, "one", 1, DropReason::no_route);
+  EXPECT_EQ(find_no_way(1'000), 1u);
+  drop(book, "two", 1, DropReason::no_route);
+  EXPECT_EQ(find_no_way(1'009), 0u) << "it is not asked for all the time";
+  EXPECT_EQ(find_no_way(1'010), 1u);
+  const auto sent = flush(book, 1'020);
+  ASSERT_EQ(sent.size(), 1u);
+  EXPECT_EQ(proto::decode_report(sent[0].payload)->count, 2u);
+  EXPECT_EQ(book.take_lost(), 0u);
+  drop(book, "three", 1, DropReason::no_route);
+  EXPECT_EQ(find_no_way(2'000), 1u);
+  EXPECT_EQ(find_no_way(2'000 + DropBook::kKeptMs - 1), 1u);
+  EXPECT_EQ(book.take_lost(), 0u);
+  EXPECT_EQ(find_no_way(2'000 + DropBook::kKeptMs + 9), 1u);
+  EXPECT_EQ(book.take_lost(), 1u);
+  EXPECT_EQ(flush(book, 9'000).size(), 0u);
+  EXPECT_FALSE(book.pending());
 }
 
 // So many senders at once that some are only counted; later ones are heard again.
