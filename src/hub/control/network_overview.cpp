@@ -81,8 +81,9 @@ LinkState NetworkOverview::state_of(const HubLink& link) const {
   if (!parts_.links.network().is_up(link.number())) return LinkState::learning;
   if (link.damped_until()) return LinkState::damped;
   const auto& next = parts_.links.next_hops().find(link.peer()->hub.hub);
-  const bool carries = !next.exists() || next.neighbour != link.peer()->hub.hub ||
-                       next.link.generation == link.place->generation;
+  if (!next.exists()) return LinkState::learning;
+  const bool carries =
+      next.neighbour != link.peer()->hub.hub || next.link.generation == link.place->generation;
   return carries ? LinkState::up : LinkState::standby;
 }
 

@@ -77,7 +77,7 @@ struct LinksRequest {
 enum class LinkState : std::uint16_t {
   dialling = 0,  ///< there is no connection; this hub dials
   away = 1,      ///< the connection broke, and may be resumed
-  learning = 2,  ///< connected; the records of the other side have not all come
+  learning = 2,  ///< connected; the records of the other side have not come, or no route is known
   standby = 3,   ///< up, while another link to the same hub carries
   damped = 4,    ///< up, and not reported yet, since it broke too often
   up = 5,

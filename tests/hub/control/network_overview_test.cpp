@@ -21,7 +21,11 @@ TEST(NetworkOverview, ShowsHubsAndLinksOfBothEnds) {
   hubs.connect();
   EXPECT_EQ(at_b.links()[0].state, LinkState::learning);
   hubs.carry();
+  EXPECT_TRUE(hubs.b.links.network().is_up(hubs.b.links.all().begin()->first));
+  EXPECT_FALSE(hubs.b.routes.find(HubId{1}).exists());
+  EXPECT_EQ(at_b.links()[0].state, LinkState::learning) << "nothing can be sent yet";
   for (int i = 0; i < 3; ++i) hubs.pass(NetworkState::kMapPause);
+  EXPECT_TRUE(hubs.b.routes.find(HubId{1}).exists());
   EXPECT_EQ(at_b.links()[0].state, LinkState::up);
   EXPECT_EQ(at_b.links()[0].hub, HubId{1});
   EXPECT_EQ(at_a.links()[0].name, "up");
