@@ -49,7 +49,7 @@ std::optional<Goodbye> Links::admit(Stranger& stranger, const proto::Hello& hell
   link->address = stranger.peer.address;
   // Both ends go on with the counts that they have under that number, or both begin anew.
   if (said.counts == 0 || said.counts != totals_.number_of(link->number()))
-    said.counts = wiring_.random() | 1;  // 0: none
+    said.counts = (wiring_.facts.instance.value() | 1) + 2 * ++counts_begun_;
   attach(*link, handshake_.accept(stranger, hello, said, moment.wall_ns), said, options_.accepted,
          moment);
   advance(moment);

@@ -137,6 +137,7 @@ class Links {
   std::map<LinkNumber, std::unique_ptr<HubLink>> links_;
   std::map<std::uint32_t, LinkNumber> by_generation_;  ///< of those with a place
   LinkTotals totals_;
+  std::uint64_t counts_begun_ = 0;  ///< as numbers of this instance; none of them is 0
   std::uint32_t last_number_ = 0;
   bool draining_ = false;
   std::optional<HubId> redrawn_;

@@ -343,7 +343,6 @@ TEST(Links, CountsBeginAnewAtBothEndsWhereOneHubStartedAgain) {
   withdraw_at_b(hubs, counts);
   hubs.b.pass(milliseconds{1'000});
   LinkRig again(1, LinkRig::accepting(), 777);
-  again.random = 1'000;
   ASSERT_FALSE(again.admit(hubs.b.dialled.back().hello));
   EXPECT_TRUE(again.attached().link->counts_anew);
   hubs.b.links.on_dialled(hubs.b.dialled.back().link,
