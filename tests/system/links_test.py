@@ -246,6 +246,25 @@ class Between(unittest.TestCase):
                    in first.process.err, "the line of its log")
         self.assertEqual(self.states(first), {first.url: "up"})
 
+    def test_a_link_whose_way_back_is_restricted(self):
+        """What cannot be acknowledged or answered is refused at once, and not sent."""
+        file = os.path.join(self.enterContext(tempfile.TemporaryDirectory(prefix="gimnet-test-")), "hub.toml")
+        with open(file, "w", encoding="utf-8") as text:
+            text.write("[links]\naccept_links = true\nallow = [3]\n")
+        first = Hub(self, "--config", file, hub_id=1)
+        second = Hub(self, "--link", first.url, hub_id=2)
+        linked(first, 2)
+        receiver = start_recv(self, second, "B")
+        start_gimnet(self, second, "answer", "C/mirror", "--echo")
+        for words in (("nodes", "B"), ("services", "C/mirror")):
+            wait_until(lambda words=words: run_gimnet(first, *words).code == 0, f"{words} at the other hub")
+        for words in (("send", "B"), ("request", "C/mirror", "hello"), ("ping", "B", "-c", "1")):
+            denied = run_gimnet(first, *words, data=b"hello\n")
+            self.assertNotEqual(denied.code, 0, words)
+            self.assertRegex(denied.err, "not_allowed|may not carry it", words)
+        self.assertGreaterEqual(first.counter("dropped.not_allowed"), 3)
+        self.assertEqual((receiver.out, second.status()["counters"]["dropped.not_allowed"]), (b"", 0))
+
     def test_a_hub_drains_beside_a_silent_link(self):
         first = Hub(self, "--accept-links", hub_id=1)
         network = Process([GIMNET, "impair", "tcp://127.0.0.1:0", first.url], stdin=subprocess.PIPE)

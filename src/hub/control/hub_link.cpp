@@ -52,6 +52,7 @@ void HubLink::begin_connection(const proto::HubIntroduction& said, const LinkTer
   if (!same) breaks_.clear();
   peer_ = said;
   connected_ = true;
+  allow_ = own.allow;
   exchange_begun = false;
   keep_alive_ms_ = std::max(own.keep_alive_ms, said.keep_alive_ms);
   silent_ms_ = std::max(own.silent_ms, said.silent_ms);

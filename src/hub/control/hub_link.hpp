@@ -1,11 +1,13 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstdint>
 #include <deque>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "hub/control/link_options.hpp"
 #include "hub/control/state/place.hpp"
@@ -73,6 +75,10 @@ class HubLink {
   /// The log says that more records come over it than there is room for. REQUIRES: peer().
   void warn_of_crowding() const;
   [[nodiscard]] bool connected() const { return connected_; }
+  /// May it bring frames of that hub's nodes?
+  [[nodiscard]] bool allows(HubId hub) const {
+    return allow_.empty() || std::ranges::find(allow_, hub) != allow_.end();
+  }
   /// Until then a broken link may be resumed, and frames wait. Nothing: it is not broken.
   [[nodiscard]] std::optional<std::chrono::milliseconds> resume_until() const {
     return resume_until_;
@@ -152,6 +158,7 @@ class HubLink {
   std::optional<DialledLink> dialled_;
   std::optional<proto::HubIntroduction> peer_;
   bool connected_ = false;
+  std::vector<HubId> allow_;  ///< as LinkTerms has it
   std::uint32_t keep_alive_ms_ = kLinkKeepAliveMs;
   std::uint32_t silent_ms_ = kLinkSilentMs;
   std::chrono::milliseconds keep_alive_at_{};

@@ -331,11 +331,12 @@ void Links::leave_network(Verdict verdict, Moment moment) {
 }
 
 void Links::publish_routes() {
-  next_hops_.publish(network_.map().next_hops(), [this](LinkNumber number) {
+  next_hops_.publish(network_.map().next_hops(), [this](LinkNumber number, HubId to) {
     const HubLink* link = find(number);
     if (link == nullptr || !link->place) return NextHop{};
     return NextHop{{link->place->shard, link->place->slot, link->place->generation},
-                   link->peer()->hub.hub};
+                   link->peer()->hub.hub,
+                   !link->allows(to)};
   });
 }
 

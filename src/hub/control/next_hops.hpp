@@ -16,18 +16,19 @@ class NextHops {
  public:
   NextHops(RouteTable& routes, ShardProxy& shards) : routes_(routes), shards_(shards) {}
 
-  /// Publishes the hops that differ from before. `place_of(LinkNumber)` gives the NextHop of a
-  /// link, none if no shard has it.
+  /// Publishes the hops that differ from before. `place_of(LinkNumber, HubId)` gives the NextHop of
+  /// a link to that hub, none if no shard has it.
   template <class PlaceOf>
   void publish(const std::array<LinkNumber, NetworkMap::kHubIds>& links, PlaceOf&& place_of) {
     std::uint64_t shards = 0;
     for (std::size_t hub = 0; hub < links.size(); ++hub) {
       if (links[hub] == LinkNumber{} && !published_[hub].exists()) continue;
-      const NextHop next = links[hub] == LinkNumber{} ? NextHop{} : place_of(links[hub]);
+      const HubId to{static_cast<std::uint16_t>(hub)};
+      const NextHop next = links[hub] == LinkNumber{} ? NextHop{} : place_of(links[hub], to);
       if (next.exists()) shards |= std::uint64_t{1} << next.link.shard.value();
       if (next == published_[hub]) continue;
       published_[hub] = next;
-      routes_.publish(HubId{static_cast<std::uint16_t>(hub)}, next);
+      routes_.publish(to, next);
     }
     routes_.publish_shards(shards);
   }

@@ -273,6 +273,18 @@ TEST(Links, TheLastOneThatIsRemovedLeavesNobodyReachable) {
   EXPECT_EQ(hubs.b.links.network().map().reachable().size(), 1u);
 }
 
+TEST(Links, AWayBackThatIsNotAllowedIsPublished) {
+  for (const bool allowed : {true, false}) {
+    LinksOptions options = LinkRig::dialling();
+    options.dial[0].terms.allow = {HubId{9}};
+    if (allowed) options.dial[0].terms.allow.push_back(kA);
+    LinkedRigs hubs(options);
+    hubs.link();
+    EXPECT_EQ(hubs.b.routes.find(kA).one_way, !allowed);
+    EXPECT_FALSE(hubs.a.routes.find(kB).one_way) << "the other end takes everything";
+  }
+}
+
 TEST(Links, OneThatTheOtherSideGaveUpIsShownForAWhile) {
   LinkedRigs hubs;
   hubs.link();

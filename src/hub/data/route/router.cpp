@@ -101,6 +101,9 @@ void Router::to_node(const Run& run, const proto::FrameHeader& header, NodeId no
 void Router::to_hub(const Run& run, const proto::FrameHeader& header, HubId hub, Arrival arrival) {
   const NextHop next = routes_.find(hub);
   if (!next.exists() || next.neighbour == from_) return drop(run, proto::DropReason::no_route);
+  // Its sender would wait for an acknowledgement or an answer that may not come.
+  if (next.one_way && header.has(proto::kFlagReport))
+    return drop(run, proto::DropReason::not_allowed);
   Recipient* recipient = find_here(run, next.link, arrival);
   if (recipient != nullptr) fanout_.deliver(*recipient, run, header, Handover{});
 }

@@ -14,6 +14,7 @@ namespace gimnet::hub {
 struct NextHop {
   NodePlace link;  ///< as a node's place: the link is a session on a shard, too
   HubId neighbour;
+  bool one_way = false;  ///< the link may not bring what nodes of that hub send
 
   [[nodiscard]] bool exists() const { return link.exists(); }
   friend bool operator==(const NextHop&, const NextHop&) = default;
@@ -29,7 +30,10 @@ class RouteTable {
   /// A place with generation 0: there is no route. REQUIRES: hub < 4096.
   void publish(HubId hub, const NextHop& next) {
     GIMNET_CHECK(hub.value() < kHubIds);
-    neighbours_[hub.value()].store(next.neighbour.value(), std::memory_order_relaxed);
+    const auto word =
+        static_cast<std::uint16_t>(next.neighbour.value() | (next.one_way ? kOneWay : 0u));
+    // relaxed: the store below hands it over
+    neighbours_[hub.value()].store(word, std::memory_order_relaxed);
     // release pairs with the acquire in find(): who sees the link sees its neighbour.
     links_[hub.value()].store(pack(next.link), std::memory_order_release);
   }
@@ -42,10 +46,12 @@ class RouteTable {
   [[nodiscard]] NextHop find(HubId hub) const {
     // acquire pairs with the release in publish()
     const NodePlace link = unpack(links_[hub.value()].load(std::memory_order_acquire));
-    return {link, HubId{neighbours_[hub.value()].load(std::memory_order_relaxed)}};
+    const std::uint16_t word = neighbours_[hub.value()].load(std::memory_order_relaxed);
+    return {link, HubId{static_cast<std::uint16_t>(word & (kOneWay - 1))}, word >= kOneWay};
   }
 
  private:
+  static constexpr std::uint16_t kOneWay = 0x8000;  ///< beside a hub id
   std::array<std::atomic<std::uint64_t>, kHubIds> links_{};
   std::array<std::atomic<std::uint16_t>, kHubIds> neighbours_{};
   std::atomic<std::uint64_t> shards_{0};
