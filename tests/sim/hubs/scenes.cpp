@@ -2,71 +2,17 @@
 
 #include <algorithm>
 #include <string>
+#include <vector>
+
+#include "tests/sim/hubs/scene_plans.hpp"
+#include "tests/sim/hubs/timed_scenes.hpp"
 
 namespace gimnet::sim::hubs {
 namespace {
 
-constexpr std::int64_t kNow = 1'700'000'000'000'000'000;
 constexpr std::uint32_t kGigabit = 125'000;  ///< bytes a ms
 constexpr std::uint32_t kRingRate = 50;      ///< bytes a ms of each link of a ring that is full
 constexpr std::uint64_t kRingBytes = 2'000;  ///< of each frame there
-constexpr std::uint64_t kFaultsMost = 8;     ///< so many restarts, for the bounds
-constexpr std::uint64_t kStartMs = 2'500;    ///< until all hubs run and are linked
-
-Plan plan_of(std::size_t hubs) {
-  Plan plan;
-  plan.faults = kFaultsMost;
-  for (std::size_t i = 0; i < hubs; ++i) {
-    HubPlan hub;
-    hub.hub = static_cast<std::uint16_t>(i + 1);
-    hub.unique = (i + 1) * 0x9E37'79B9'7F4A'7C15;
-    hub.wall_ns = kNow;
-    plan.hubs.push_back(hub);
-  }
-  return plan;
-}
-
-void wire(Plan& plan, std::size_t from, std::size_t to, std::uint64_t delay_ms = 1,
-          std::uint32_t bytes_per_ms = 0) {
-  WirePlan each;
-  each.dialler = from;
-  each.acceptor = to;
-  each.delay_ms = delay_ms;
-  each.bytes_per_ms = bytes_per_ms;
-  plan.wires.push_back(each);
-}
-
-void node(Plan& plan, std::size_t hub, std::string name = {}) {
-  NodePlan each;
-  each.hub = each.other = hub;
-  each.name = name.empty() ? "n" + std::to_string(plan.nodes.size()) : std::move(name);
-  plan.nodes.push_back(std::move(each));
-}
-
-/// A node at each hub, which is linked to the next one.
-Plan chain(std::size_t hubs, std::uint64_t delay_ms = 1, std::uint32_t bytes_per_ms = 0) {
-  Plan plan = plan_of(hubs);
-  for (std::size_t i = 0; i < hubs; ++i) {
-    if (i != 0) wire(plan, i - 1, i, delay_ms, bytes_per_ms);
-    node(plan, i);
-  }
-  return plan;
-}
-
-Plan ring(std::size_t hubs, std::uint64_t delay_ms = 1, std::uint32_t bytes_per_ms = 0) {
-  Plan plan = chain(hubs, delay_ms, bytes_per_ms);
-  wire(plan, hubs - 1, 0, delay_ms, bytes_per_ms);
-  return plan;
-}
-
-Plan star(std::size_t hubs) {
-  Plan plan = plan_of(hubs);
-  for (std::size_t i = 0; i < hubs; ++i) {
-    if (i != 0) wire(plan, i, 0);
-    node(plan, i);
-  }
-  return plan;
-}
 
 /// So many names at hubs 0 and 1, each at both.
 void same_names(Plan& plan, std::size_t names, std::size_t one, std::size_t other) {
@@ -395,6 +341,14 @@ constexpr Scene kScenes[] = {
 
 }  // namespace
 
-std::span<const Scene> scenes() { return kScenes; }
+std::span<const Scene> scenes() {
+  static const std::vector<Scene> all = [] {
+    std::vector<Scene> every(std::begin(kScenes), std::end(kScenes));
+    const std::span<const Scene> timed = timed_scenes();
+    every.insert(every.end(), timed.begin(), timed.end());
+    return every;
+  }();
+  return all;
+}
 
 }  // namespace gimnet::sim::hubs

@@ -6,6 +6,7 @@
 #include "base/endian.hpp"
 #include "proto/control/ns.hpp"
 #include "proto/control/ns_register.hpp"
+#include "proto/frame/report.hpp"
 
 namespace gimnet::sim::hubs {
 namespace {
@@ -142,6 +143,7 @@ void SimNode::read(milliseconds now) {
 }
 
 void SimNode::take(const proto::FrameHeader& header, std::span<const std::byte> payload) {
+  if (header.kind == Pictures::kKind) return pictures_.take(payload, now_);
   switch (header.kind) {
     case Kind::unicast:
     case Kind::service: {
@@ -160,7 +162,12 @@ void SimNode::take(const proto::FrameHeader& header, std::span<const std::byte> 
     case Kind::flow:
       return take_flow(payload);
     case Kind::report:
-      return around_.census.note(Event::no_route);
+      around_.census.note(Event::no_route);
+      if (const auto report = proto::decode_report(payload)) {
+        reported_ += report->count;
+        first_report_.try_emplace(report->reason, now_);
+      }
+      return;
     case Kind::link:
       if (const auto welcome = proto::decode<proto::Welcome>(payload)) {
         welcomed_ = true;
@@ -313,6 +320,13 @@ void SimNode::broadcast(std::uint64_t number) {
   std::vector<std::byte> payload(Book::kNumberBytes);
   store_le(payload.data(), number);
   write(Kind::broadcast, kEverybody, payload);
+}
+
+void SimNode::show(NodeId to, std::uint32_t bytes) {
+  constexpr auto kFlags =
+      static_cast<std::uint8_t>(proto::Policy::latest) | unsigned{proto::kFlagFragment};
+  for (const auto& frame : pictures_.cut(bytes, now_))
+    write(Pictures::kKind, to.value(), frame, static_cast<std::uint8_t>(kFlags));
 }
 
 std::optional<std::uint64_t> SimNode::send(Kind kind, std::uint32_t dst, std::uint64_t session,

@@ -13,6 +13,7 @@
 #include "proto/frame/flow.hpp"
 #include "tests/sim/hubs/book.hpp"
 #include "tests/sim/hubs/census.hpp"
+#include "tests/sim/hubs/pictures.hpp"
 #include "tests/sim/hubs/plan.hpp"
 #include "tests/sim/hubs/sim_hub.hpp"
 
@@ -60,6 +61,15 @@ class SimNode {
   void broadcast(std::uint64_t number);
   /// The numbers that came.
   [[nodiscard]] const std::vector<std::uint64_t>& broadcasts() const { return broadcasts_; }
+  /// A picture that replaces those which wait. REQUIRES: is_up().
+  void show(NodeId to, std::uint32_t bytes);
+  [[nodiscard]] const std::vector<Pictures::Seen>& pictures() const { return pictures_.seen(); }
+  /// Its frames that were reported, of all reasons.
+  [[nodiscard]] std::uint64_t reported() const { return reported_; }
+  [[nodiscard]] std::optional<milliseconds> first_report(proto::DropReason reason) const {
+    const auto found = first_report_.find(reason);
+    return found == first_report_.end() ? std::nullopt : std::optional{found->second};
+  }
   /// A message to the subscribers of its service. Returns its number. REQUIRES: given().
   std::uint64_t publish();
   /// To the service that a node of that name provides, if there is one.
@@ -120,6 +130,9 @@ class SimNode {
   std::uint64_t published_ = 0;
   std::uint64_t taken_ = 0;
   std::vector<std::uint64_t> broadcasts_;
+  Pictures pictures_;
+  std::uint64_t reported_ = 0;
+  std::map<proto::DropReason, milliseconds> first_report_;
   std::set<std::string> wanted_;  ///< full names of services
   std::map<GroupId, std::vector<std::uint64_t>> heard_;
   milliseconds now_{0};

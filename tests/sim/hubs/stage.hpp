@@ -13,6 +13,7 @@ class Stage {
 
   /// It may take longer.
   [[nodiscard]] bool is_long() const { return world_.options_.is_long; }
+  [[nodiscard]] milliseconds now() const { return world_.now_; }
   void run(std::uint64_t ms) { world_.run_until(world_.now_ + milliseconds{ms}); }
   /// Until that wire carries a link at both ends. Errors: it does not within 10 s.
   void run_until_up(std::size_t wire);

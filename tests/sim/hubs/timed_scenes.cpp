@@ -1,0 +1,92 @@
+#include "tests/sim/hubs/timed_scenes.hpp"
+
+#include <algorithm>
+#include <optional>
+
+#include "tests/sim/hubs/scene_plans.hpp"
+
+namespace gimnet::sim::hubs {
+namespace {
+
+// A hub is cut off: frames to the other side are reported
+
+/// Within 200 ms after the time for resume is over: that is 300 ms and four round trips of 2 ms.
+constexpr std::uint64_t kNoRouteAfterCloseMs = 500 + 8;
+/// A link is silent for 1 s until it counts as broken, and 100 ms may pass until that is seen.
+constexpr std::uint64_t kNoRouteAfterSilenceMs = 1'000 + kNoRouteAfterCloseMs;
+
+/// Node 0 sends a frame each 10 ms from now on. Its first report of `no_route` comes in time, and
+/// none of its frames is without a report.
+void expect_no_route(Stage& stage, std::uint64_t within_ms) {
+  const milliseconds began = stage.now();
+  const NodeId to = stage.node(1).id();
+  const std::uint64_t arrived = stage.arrived();
+  std::uint64_t sent = 0;
+  for (; sent < within_ms / 10 + 10; ++sent) {
+    Stage::need(stage.node(0).send_to(to).has_value(), Checker::resumes, "a node may not send");
+    stage.run(10);
+  }
+  const auto first = stage.node(0).first_report(proto::DropReason::no_route);
+  Stage::need(first.has_value(), Checker::reachable, "no frame is reported no_route");
+  Stage::need(*first <= began + milliseconds{within_ms}, Checker::reachable,
+              "no_route comes too late");
+  stage.run(200);
+  Stage::need(stage.node(0).reported() + (stage.arrived() - arrived) >= sent, Checker::reachable,
+              "a frame is neither delivered nor reported");
+}
+
+void play_closed_link(Stage& stage) {
+  stage.run(kStartMs);
+  stage.stop(1);
+  expect_no_route(stage, kNoRouteAfterCloseMs);
+  stage.start(1);
+}
+
+void play_silent_link(Stage& stage) {
+  stage.run(kStartMs);
+  stage.cut(0);
+  expect_no_route(stage, kNoRouteAfterSilenceMs);
+  stage.mend(0);
+}
+
+// Pictures over a link that is too slow for all of them
+
+constexpr std::uint32_t kPictureBytes = 200'000;
+constexpr std::uint64_t kPictureEveryMs = 33;
+constexpr std::uint32_t kPictureRate = 1'000;  ///< bytes a ms: one picture takes 200 ms
+constexpr std::uint64_t kPictureDelayMs = 20;
+/// Two transmission times and the delay of the way.
+constexpr milliseconds kPictureAgeMost{2 * (kPictureBytes / kPictureRate) + kPictureDelayMs};
+constexpr std::uint64_t kPicturesMs = 20'000;
+
+void play_pictures(Stage& stage) {
+  stage.run(kStartMs);
+  for (std::uint64_t ms = 0; ms < kPicturesMs; ms += kPictureEveryMs) {
+    stage.node(0).show(stage.node(1).id(), kPictureBytes);
+    stage.run(kPictureEveryMs);
+  }
+  const auto& seen = stage.node(1).pictures();
+  // The link carries 5 a second.
+  Stage::need(seen.size() >= kPicturesMs / 1'000 * 5 * 8 / 10, Checker::reachable,
+              "fewer pictures come than four fifths of what the link carries");
+  std::optional<milliseconds> before;
+  for (const Pictures::Seen& each : seen) {
+    Stage::need(!before || each.shown_at > *before, Checker::reachable, "an older picture comes");
+    before = each.shown_at;
+    Stage::need(each.came_at - each.shown_at <= kPictureAgeMost, Checker::reachable,
+                "a picture is older than two transmission times");
+  }
+}
+
+constexpr Scene kTimed[] = {
+    {"no_route_after_a_closed_link", [] { return chain(2); }, play_closed_link},
+    {"no_route_after_a_silent_link", [] { return chain(2); }, play_silent_link},
+    {"pictures_of_a_slow_link", [] { return chain(2, kPictureDelayMs, kPictureRate); },
+     play_pictures},
+};
+
+}  // namespace
+
+std::span<const Scene> timed_scenes() { return kTimed; }
+
+}  // namespace gimnet::sim::hubs
