@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <memory>
 
 #include "base/byte_buffer.hpp"
@@ -8,6 +9,13 @@
 
 using namespace gimnet;
 using namespace gimnet::gimi;
+
+namespace {
+
+/// The least rate of a subscription, in Hz, as hubs have it.
+constexpr double kRateMin = 0.001;
+
+}  // namespace
 
 extern "C" {
 
@@ -199,6 +207,13 @@ gimi_status gimi_subscribe(gimi_handle node, const char* full_name,
       if (given.silence_ms < 0) {
         return fail(GIMI_BAD_ARGUMENT, "cannot subscribe to '" + text_of(full_name) +
                                            "': silence_ms is negative; 0 is without an answer");
+      }
+      // The hub hears of the widest wish for a service alone.
+      const bool has_rate = how.rate_hz >= kRateMin && std::isfinite(how.rate_hz);
+      if (how.rate_hz != 0.0 && !has_rate) {
+        return fail(GIMI_BAD_ARGUMENT, "cannot subscribe to '" + text_of(full_name) +
+                                           "': rate_hz is no number from 0.001 on; leave it out "
+                                           "for every message");
       }
       if (how.newest_only && how.queue > 1) {
         return fail(GIMI_BAD_ARGUMENT, "cannot subscribe to '" + text_of(full_name) +

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <optional>
 #include <string>
 #include <thread>
@@ -150,6 +151,14 @@ TEST_F(Wishes, ThatContradictEachOtherAreRefusedWithASentence) {
   const auto refused = viewer_.subscribe("robot/eye", {.newest_only = true, .queue = 2});
   ASSERT_TRUE(refused.is(Status::bad_argument));
   EXPECT_NE(refused.failure().sentence.find("leave one of them out"), std::string::npos);
+}
+
+TEST_F(Wishes, ARateThatIsNoneIsRefusedBesideASubscriptionWithoutOne) {
+  const auto all = viewer_.subscribe("robot/eye").or_throw();
+  for (const double rate_hz : {-1.0, 0.0009, std::nan(""), HUGE_VAL}) {
+    const auto refused = viewer_.subscribe("robot/eye", {.rate_hz = rate_hz});
+    EXPECT_TRUE(refused.is(Status::bad_argument)) << rate_hz;
+  }
 }
 
 TEST_F(Wishes, EachSubscriptionHasAQueueOfItsOwn) {
