@@ -77,9 +77,7 @@ const char* node_name_fault(std::string_view name) {
 
 const char* service_full_name_fault(std::string_view name) {
   if (name.find('*') != std::string_view::npos && valid_pattern(name)) {
-    return "it is a pattern, and one service is meant: a watch (Node::watch, nif_watch) tells "
-           "which "
-           "services match";
+    return "it is a pattern, and one service is meant: watch() tells which services match";
   }
   if (const char* found = name_fault(name)) return found;
   const auto slash = name.rfind('/');
