@@ -6,6 +6,7 @@
 #include <cctype>
 #include <span>
 #include <string_view>
+#include <utility>
 
 #include "base/suggest.hpp"
 #include "hub/config/sources.hpp"
@@ -134,6 +135,21 @@ std::string wrong_word(const CLI::App& app, std::span<const char* const> words) 
   });
 }
 
+/// The argument for a word of other servers, or "".
+std::string_view argument_meant(std::string_view word) {
+  static constexpr std::array<std::pair<std::string_view, std::string_view>, 7> kWords{{
+      {"--port", "--listen"},
+      {"-p", "--listen"},
+      {"--host", "--listen"},
+      {"--bind", "--listen"},
+      {"--name", "--hub-name"},
+      {"--id", "--hub-id"},
+      {"-c", "--config"},
+  }};
+  const auto* const found = std::ranges::find(kWords, word, &decltype(kWords)::value_type::first);
+  return found == kWords.end() ? std::string_view{} : found->second;
+}
+
 /// Why a word that CLI11 left over cannot be, or "". It leaves over the end of the options, too.
 std::string leftover_fault(std::vector<std::string> words) {
   const auto end = std::ranges::find(words, "--");
@@ -145,8 +161,11 @@ std::string leftover_fault(std::vector<std::string> words) {
   std::vector<std::string_view> names;
   for (const OptionText& text : option_texts())
     names.push_back(std::string_view{text.name}.substr(std::string_view{text.name}.find("--")));
+  const std::string meant{argument_meant(word)};
+  const std::string nearest =
+      meant.empty() ? did_you_mean(word, names) : "; did you mean " + meant + "?";
   return "there is no argument '" + escaped(word, kQuotedMax) + "'" +
-         (behind_end ? " behind --" : did_you_mean(word, names)) + " (tcphub --help shows all)";
+         (behind_end ? " behind --" : nearest) + " (tcphub --help shows all)";
 }
 
 Given flag(const std::string& key, const std::string& label, std::string text) {

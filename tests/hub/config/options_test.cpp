@@ -128,6 +128,8 @@ TEST(Options, WhatFollowsTwoDashesIsNoOption) {
   EXPECT_EQ(error({"--", "--"}),
             "tcphub: there is no argument '--' behind -- (tcphub --help shows all)\n");
   EXPECT_THAT(error({"spni", "--"}), HasSubstr("there is no argument 'spni'"));
+  EXPECT_THAT(error({"--port", "7460"}), HasSubstr("'--port'; did you mean --listen?"));
+  EXPECT_THAT(error({"--name=lab"}), HasSubstr("'--name'; did you mean --hub-name?"));
 }
 
 TEST(Options, SaysWhatAnOptionTakes) {
