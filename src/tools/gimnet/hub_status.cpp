@@ -239,6 +239,12 @@ std::string json_of(const std::vector<ServiceRecord>& services, const ProviderIn
   return json.end_array().str() + "\n";
 }
 
+/// The application's numbers of its messages; those of requests are the library's.
+std::string type_of(const ServiceRecord& service) {
+  if (service.answers()) return "-";
+  return std::to_string(service.key.type) + "/" + std::to_string(service.key.instance);
+}
+
 /// The messages that its subscribers missed, and who missed most of them.
 std::string missed_of(const ServiceRecord& service) {
   std::string words = std::to_string(service.missed);
@@ -253,8 +259,7 @@ std::string table_of(const std::vector<ServiceRecord>& services, const ProviderI
   for (const ServiceRecord& service : services) {
     const Provider provider = providers.of(service.node);
     table.add({service.name, service.node.text(), service.hub_name, std::string(provider.state),
-               provider.place.empty() ? "-" : std::string(provider.place),
-               std::to_string(service.key.type) + "/" + std::to_string(service.key.instance),
+               provider.place.empty() ? "-" : std::string(provider.place), type_of(service),
                direction_of(service), delivery_of(service), service.retain ? "yes" : "no",
                std::to_string(service.subscribers), missed_of(service), service.metadata},
               provider.state == "connected" ? Tone::plain : Tone::warning);
