@@ -9,6 +9,7 @@ from tree import CODE_FOLDERS, CPP_SUFFIXES, HEADER_SUFFIXES, TEXT_FOLDERS
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "planted"))
 import planted  # noqa: E402
 from comments import comments_open_with_their_subject  # noqa: E402
+from mirrors import UNTESTED_LIST, UNTESTED_MAX, tests_are_built, tests_mirror_sources  # noqa: E402, F401
 from nouns import class_in_one_source, class_names_exist_once, small_headers_are_shared  # noqa: E402
 
 FILE_LINES_MAX = 400
@@ -17,8 +18,6 @@ FILE_LINES_EXCUSED = ("include/gimnet/nif.h", "tests/client/gimi/service_table_m
                       "tests/hub/control/handle/administer_test.cpp")
 LINE_COLUMNS_MAX = 100
 FUNCTION_LINES_MAX = 59
-UNTESTED_LIST = "tests/style/untested_sources.txt"
-UNTESTED_MAX = 12
 PLANTED_TABLE = "tests/planted/bugs.toml"
 REQUIREMENTS = "docs/requirements.md"
 
@@ -285,33 +284,6 @@ def nothing_left_for_later(tree):
                 yield f"{file.path}:{number}: '{match[0]}': finish it or leave it out"
 
 
-def _has_mirrored_test(tree, source):
-    stem = source.removeprefix("src/").rsplit(".", 1)[0]
-    return any(tree.exists(f"tests/{stem}_test{suffix}") for suffix in (".cpp", ".c", ".py"))
-
-
-def tests_mirror_sources(tree):
-    excused, without_test = {}, 0
-    for number, line in tree.list_entries(UNTESTED_LIST):
-        source, _, reason = (part.strip() for part in line.partition(":"))
-        excused[source] = reason
-        where = f"{UNTESTED_LIST}:{number}:"
-        if not reason:
-            yield f"{where} {source} has no reason"
-        elif reason.startswith("tests/"):
-            if not tree.exists(reason.split()[0]):
-                yield f"{where} {reason.split()[0]} does not exist"
-        else:
-            without_test += 1
-        if not tree.exists(source) or _has_mirrored_test(tree, source):
-            yield f"{where} {source} does not exist or has its own test: take it off the list"
-    if without_test > UNTESTED_MAX:
-        yield f"{UNTESTED_LIST}: {without_test} sources without a test, at most {UNTESTED_MAX}"
-    for file in tree.files(("src",), (".cpp", ".c")):
-        if file.path not in excused and not _has_mirrored_test(tree, file.path):
-            yield f"{file.path}: no {file.path.replace('src', 'tests', 1).rsplit('.', 1)[0]}_test.cpp"
-
-
 def planted_bugs_fit(tree):
     """The table of planted bugs fits the sources, each fuzz target has one, and the product has none."""
     for file in tree.files(("src", "include"), CPP_SUFFIXES):
@@ -327,6 +299,9 @@ def planted_bugs_fit(tree):
         yield f"{PLANTED_TABLE}: {mistake}"
     targets = {name for file in tree.files(("fuzz",), (".txt",)) if file.path.endswith("CMakeLists.txt")
                for name in _FUZZ_TARGET.findall(file.text)}
+    for program in sorted({bug.program for bug in bugs if "." in bug.program}):
+        if not tree.exists(f"tests/{program.replace('.', '/')}.cpp"):
+            yield f"{PLANTED_TABLE}: there is no test {program}"
     with_bug = {bug.program for bug in bugs if bug.program.endswith("_fuzz")}
     for target in sorted(with_bug - targets):
         yield f"{PLANTED_TABLE}: there is no fuzz target {target}"
@@ -386,6 +361,7 @@ RULES = (
     class_names_exist_once,
     class_in_one_source,
     tests_mirror_sources,
+    tests_are_built,
     planted_bugs_fit,
     comments_open_with_their_subject,
     requirements_name_tests_that_exist,

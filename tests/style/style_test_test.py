@@ -263,6 +263,15 @@ CASES = {
             | {f"src/a{n}.cpp": "" for n in range(rules.UNTESTED_MAX + 1)},
         ],
     ),
+    rules.tests_are_built: (
+        [{"tests/a/b_test.cpp": "", "tests/a/CMakeLists.txt": "gimnet_test(b_test.cpp DEPENDS c)\n"},
+         {"tests/a/b/c_test.cpp": "", "tests/a/CMakeLists.txt": "foreach(_test d b/c)\n"}],
+        [
+            {"tests/a/b_test.cpp": ""},
+            {"tests/a/b_test.cpp": "", "tests/a/CMakeLists.txt": "gimnet_test(b_b_test.cpp)\n"},
+            {"tests/a/b_test.cpp": "", "tests/c/CMakeLists.txt": "gimnet_test(b_test.cpp)\n"},
+        ],
+    ),
     rules.planted_bugs_fit: (
         [{"src/a.cpp": "int a = 1;\n", rules.PLANTED_TABLE: planted_table("a_fuzz", "a=1"),
           "fuzz/CMakeLists.txt": "gimnet_fuzz(b/a_fuzz.cpp DEPENDS c)\n"},
@@ -272,6 +281,7 @@ CASES = {
             {"src/a.cpp": "int a = 1;\n", rules.PLANTED_TABLE: planted_table("gimnet-sim", "b")},
             {"src/a.cpp": "int a = 1, aa = 1;\n", rules.PLANTED_TABLE: planted_table("gimnet-sim", "a = 1")},
             {"src/b.cpp": "int a = 1;\n", rules.PLANTED_TABLE: planted_table("gimnet-sim", "a = 1")},
+            {"src/a.cpp": "int a = 1;\n", rules.PLANTED_TABLE: planted_table("b.a_test", "a = 1")},
             {"src/a.cpp": "int a = 1;\n", rules.PLANTED_TABLE: planted_table("a_fuzz", "a = 1")},
             {"fuzz/CMakeLists.txt": "gimnet_fuzz(a_fuzz.cpp)\n"},
             {"src/a.cpp": "int a = 1;\n", rules.PLANTED_TABLE: 2 * planted_table("gimnet-sim", "a = 1")},
