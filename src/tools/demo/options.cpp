@@ -6,6 +6,7 @@
 #include <charconv>
 #include <vector>
 
+#include "proto/control/names.hpp"
 #include "tools/demo/log_player.hpp"
 
 namespace gimnet::demo {
@@ -81,16 +82,6 @@ std::optional<Error> read_text(std::string& out, std::string_view name, std::str
 // With a '/' and the name of a service it is to be within the 255 bytes of a full name.
 constexpr std::size_t kRobotNameBytesMax = 200;
 
-// Is it a node's name by docs/protocol.md, section 8, of one part?
-bool is_node_name(std::string_view name) {
-  const auto allowed = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
-           c == '_' || c == '-';
-  };
-  return !name.empty() && name.size() <= kRobotNameBytesMax &&
-         std::all_of(name.begin(), name.end(), allowed);
-}
-
 std::optional<Error> apply(DemoOptions& options, std::string_view name, std::string_view value) {
   if (name == "--log") return read_text(options.log, name, value);
   if (name == "--map") return read_text(options.map, name, value);
@@ -104,7 +95,7 @@ std::optional<Error> apply(DemoOptions& options, std::string_view name, std::str
   if (name == "--labs") options.labs = true;
   if (name == "--help" || name == "-h") options.help = true;
   if (name != "--robot") return std::nullopt;
-  if (!is_node_name(value)) {
+  if (value.size() > kRobotNameBytesMax || !proto::valid_service_name(value)) {
     return Error{
         fmt::format("--robot takes a name of letters, digits, '.', '_' and '-', not '{}'", value)};
   }
