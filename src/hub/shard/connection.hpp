@@ -169,6 +169,8 @@ struct Connection : Recipient {
     if (tail_since_ms != 0) tail_since_ms = now_ms;
   }
   [[nodiscard]] SessionRef session() const { return {slot, generation}; }
+  /// CONFIRM is to be written to it in this turn.
+  [[nodiscard]] bool confirm_due() const { return resume != nullptr && resume->confirm_due; }
   /// Slots are reused and connections replaced: an event of the poller is for exactly one
   /// attachment.
   [[nodiscard]] std::uint64_t token() const {

@@ -133,7 +133,7 @@ void Flusher::on_emptied(Connection& connection) {
   connection.outbox.signal_room(state_.egress);
   if (std::exchange(connection.gauged, false)) state_.sessions.set_queued(connection.slot, 0);
   if (connection.gate.has(ReadGate::draining) && state_.nothing_follows &&
-      connection.transport->pending_out() == 0) {
+      !connection.confirm_due() && connection.transport->pending_out() == 0) {
     closer_.close(connection, proto::GoodbyeCode::draining, "the hub is shutting down");
   }
 }

@@ -61,7 +61,7 @@ std::uint64_t Keeper::next_tick_at_ms() const {
 void Keeper::look_at(Connection& connection) {
   const Limits& limits = state_.limits;
   const bool written = connection.outbox.empty() && !connection.writer.in_frame() &&
-                       connection.transport->pending_out() == 0;
+                       !connection.confirm_due() && connection.transport->pending_out() == 0;
   if (draining_ && (state_.now_ms >= drain_deadline_ms_ || (written && state_.nothing_follows))) {
     return closer_.close(connection, proto::GoodbyeCode::draining,
                          "the hub is shutting down; dial again");
