@@ -7,6 +7,10 @@
  * and readers can be used by different threads, one of them by one thread at a time. Nothing is
  * ever read or written beyond the sizes given.
  *
+ * REQUIRES: writers, readers, values and the places of results are not NULL. Memory, bytes and
+ * texts may be: those of size 0 are empty, those of another size are refused (BITESTREAM_NO_ROOM,
+ * BITESTREAM_BAD_VALUE, BITESTREAM_MALFORMED).
+ *
  *     unsigned char memory[64];
  *     bitestream_writer writer = bitestream_writer_over(memory, sizeof memory);
  *     bitestream_put_text(&writer, bitestream_number_key(3), "robot", 5);

@@ -96,6 +96,7 @@ bitestream_reader bitestream_reader_over(const void* bytes, size_t size) {
 
 bitestream_status bitestream_next(bitestream_reader* reader, bitestream_value* value) {
   if (reader->offset == reader->size) return BITESTREAM_END;
+  if (reader->bytes == nullptr) return BITESTREAM_MALFORMED;
   Cursor cursor(*reader);
   if (!take_value(cursor, value) || !legal_at_depth(*value, reader->depth))
     return BITESTREAM_MALFORMED;

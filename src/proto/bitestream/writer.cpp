@@ -90,7 +90,7 @@ void put(bitestream_writer* writer, const bitestream_key& key, Type type, const 
   }
   if (size == 0 && unit_size(type) == 0) return;
   if (size == 0 && is_array(type)) return;
-  if (!size_fits(type, size) ||
+  if (bytes == nullptr || !size_fits(type, size) ||
       !valid_content(type, static_cast<const unsigned char*>(bytes), size)) {
     set_status(writer, BITESTREAM_BAD_VALUE);
     return;
@@ -124,7 +124,8 @@ bool bitestream_keys_equal(bitestream_key a, bitestream_key b) {
 }
 
 bitestream_writer bitestream_writer_over(void* memory, size_t size) {
-  return {static_cast<unsigned char*>(memory), 0, size, false, BITESTREAM_OK, 0, {}};
+  const std::size_t capacity = memory == nullptr ? 0 : size;
+  return {static_cast<unsigned char*>(memory), 0, capacity, false, BITESTREAM_OK, 0, {}};
 }
 
 bitestream_writer bitestream_writer_growable(void) {

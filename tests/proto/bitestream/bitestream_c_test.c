@@ -149,11 +149,33 @@ static void refuses_hostile_bytes(void) {
   EXPECT(bitestream_check(hostile, sizeof hostile) == BITESTREAM_MALFORMED);
 }
 
+static bitestream_status status_of_text_without_bytes(size_t size) {
+  unsigned char memory[16];
+  bitestream_writer writer = bitestream_writer_over(memory, sizeof memory);
+  bitestream_put_text(&writer, bitestream_number_key(1), NULL, size);
+  return bitestream_finish(&writer);
+}
+
+static void refuses_sizes_without_bytes(void) {
+  EXPECT(status_of_text_without_bytes(0) == BITESTREAM_OK);
+  EXPECT(status_of_text_without_bytes(5) == BITESTREAM_BAD_VALUE);
+  bitestream_writer writer = bitestream_writer_over(NULL, 10);
+  bitestream_put_u8(&writer, bitestream_number_key(1), 1);
+  EXPECT(bitestream_finish(&writer) == BITESTREAM_NO_ROOM);
+  EXPECT(bitestream_check(NULL, 0) == BITESTREAM_OK);
+  EXPECT(bitestream_check(NULL, 5) == BITESTREAM_MALFORMED);
+  bitestream_reader reader = bitestream_reader_over(NULL, 5);
+  bitestream_value value;
+  EXPECT(bitestream_next(&reader, &value) == BITESTREAM_MALFORMED);
+  EXPECT(bitestream_find(&reader, bitestream_number_key(1), &value) == BITESTREAM_MALFORMED);
+}
+
 int main(void) {
   writes_the_example_of_the_document();
   reads_the_example_of_the_document();
   grows_and_reads_back();
   refuses_hostile_bytes();
+  refuses_sizes_without_bytes();
   if (failures == 0) printf("ok\n");
   return failures == 0 ? 0 : 1;
 }
