@@ -15,6 +15,7 @@
 #include "gimnet/gimi/handles.hpp"
 #include "gimnet/gimi/hub_access.hpp"
 #include "gimnet/gimi/message.hpp"
+#include "gimnet/gimi/namespace.hpp"
 #include "gimnet/gimi/node_state.hpp"
 #include "gimnet/gimi/options.hpp"
 #include "gimnet/gimi/outcome.hpp"
@@ -47,7 +48,7 @@
 // Received messages wait in queues, which the program empties when it has time; an Executor calls
 // back in the thread that runs it.
 
-namespace gimnet::inline v0_9 {
+namespace gimnet::inline GIMNET_GIMI_NAMESPACE {
 
 /// A member of the network. Leaves for good when it is destroyed.
 class Node : public HubAccess {
@@ -341,4 +342,4 @@ class Node : public HubAccess {
   explicit Node(gimi_handle handle) : HubAccess(handle) {}
 };
 
-}  // namespace gimnet::inline v0_9
+}  // namespace gimnet::inline GIMNET_GIMI_NAMESPACE

@@ -9,11 +9,12 @@
 
 #include "gimnet/gimi.h"
 #include "gimnet/gimi/conversions.hpp"
+#include "gimnet/gimi/namespace.hpp"
 #include "gimnet/gimi/requests.hpp"
 
 // Answering services, and requests that wait for their end. Part of gimnet/gimi.hpp.
 
-namespace gimnet::inline v0_9 {
+namespace gimnet::inline GIMNET_GIMI_NAMESPACE {
 
 /// A request that the program took. It is answered once: by reply(), by fail(), or with an error
 /// when it is destroyed. Thread safety: a value that can be moved; one thread at a time.
@@ -113,4 +114,4 @@ class PendingReply {
   detail::SharedHandle handle_;
 };
 
-}  // namespace gimnet::inline v0_9
+}  // namespace gimnet::inline GIMNET_GIMI_NAMESPACE

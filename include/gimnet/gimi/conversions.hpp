@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "gimnet/gimi.h"
+#include "gimnet/gimi/namespace.hpp"
 #include "gimnet/gimi/node_state.hpp"
 #include "gimnet/gimi/options.hpp"
 #include "gimnet/gimi/outcome.hpp"
@@ -16,7 +17,7 @@
 
 // From the C structures to those of C++, and back. Part of gimnet/gimi.hpp.
 
-namespace gimnet::inline v0_9::detail {
+namespace gimnet::inline GIMNET_GIMI_NAMESPACE::detail {
 
 /// Ends a handle. It is shared by the copies of a Publisher and so on.
 class Handle {
@@ -279,4 +280,4 @@ template <class Call>
           now.last_messages_not_kept};
 }
 
-}  // namespace gimnet::inline v0_9::detail
+}  // namespace gimnet::inline GIMNET_GIMI_NAMESPACE::detail

@@ -13,6 +13,7 @@
 
 #include "gimnet/gimi/answers.hpp"
 #include "gimnet/gimi/handles.hpp"
+#include "gimnet/gimi/namespace.hpp"
 #include "gimnet/gimi/wait_set.hpp"
 
 // Callbacks in a thread of the program. Part of gimnet/gimi.hpp.
@@ -22,7 +23,7 @@
 //     executor.every(std::chrono::milliseconds{100}, [&] { odometry.publish(position()); });
 //     executor.run().or_throw();
 
-namespace gimnet::inline v0_9 {
+namespace gimnet::inline GIMNET_GIMI_NAMESPACE {
 
 /// Calls the program back for what comes, in the thread that is in run(). A callback that blocks
 /// keeps nobody else's data, nor those of its own nodes, which wait in their queues. One that
@@ -205,4 +206,4 @@ class Executor {
   std::atomic<bool> stop_{false};
 };
 
-}  // namespace gimnet::inline v0_9
+}  // namespace gimnet::inline GIMNET_GIMI_NAMESPACE

@@ -10,6 +10,7 @@
 
 #include "gimnet/gimi/conversions.hpp"
 #include "gimnet/gimi/message.hpp"
+#include "gimnet/gimi/namespace.hpp"
 #include "gimnet/gimi/node_state.hpp"
 #include "gimnet/gimi/options.hpp"
 #include "gimnet/gimi/outcome.hpp"
@@ -17,7 +18,7 @@
 
 // Publishers, subscriptions, queues, senders and watches. Part of gimnet/gimi.hpp.
 
-namespace gimnet::inline v0_9 {
+namespace gimnet::inline GIMNET_GIMI_NAMESPACE {
 
 namespace detail {
 
@@ -367,4 +368,4 @@ class ConnectionWatch {
   detail::SharedHandle handle_;
 };
 
-}  // namespace gimnet::inline v0_9
+}  // namespace gimnet::inline GIMNET_GIMI_NAMESPACE

@@ -9,10 +9,11 @@
 
 #include "gimnet/gimi.h"
 #include "gimnet/gimi/conversions.hpp"
+#include "gimnet/gimi/namespace.hpp"
 
 // Questions to hubs, and changes of them by administrators. Part of gimnet/gimi.hpp.
 
-namespace gimnet::inline v0_9 {
+namespace gimnet::inline GIMNET_GIMI_NAMESPACE {
 
 /// The part of a Node that speaks with hubs as hubs. Thread safety and errors: as Node's.
 class HubAccess {
@@ -120,4 +121,4 @@ class HubAccess {
   gimi_handle handle_ = 0;  ///< of the node
 };
 
-}  // namespace gimnet::inline v0_9
+}  // namespace gimnet::inline GIMNET_GIMI_NAMESPACE

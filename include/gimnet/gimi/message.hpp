@@ -13,9 +13,10 @@
 #include <type_traits>
 #include <utility>
 
+#include "gimnet/gimi/namespace.hpp"
 #include "gimnet/gimi_message.h"
 
-namespace gimnet::inline v0_9 {
+namespace gimnet::inline GIMNET_GIMI_NAMESPACE {
 
 /// A node as others address it: hub << 20 | index, printed `7.17`. 0 is nobody. A value type.
 struct Peer {
@@ -177,4 +178,4 @@ class Message {
   gimi_message message_{};
 };
 
-}  // namespace gimnet::inline v0_9
+}  // namespace gimnet::inline GIMNET_GIMI_NAMESPACE

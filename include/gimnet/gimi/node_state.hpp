@@ -4,10 +4,11 @@
 #include <string>
 
 #include "gimnet/gimi/message.hpp"
+#include "gimnet/gimi/namespace.hpp"
 
 // The state of a node's connection, and its losses. Value types.
 
-namespace gimnet::inline v0_9 {
+namespace gimnet::inline GIMNET_GIMI_NAMESPACE {
 
 /// State of a node's connection at one moment.
 struct NodeState {
@@ -72,4 +73,4 @@ struct LostCounts {
   }
 };
 
-}  // namespace gimnet::inline v0_9
+}  // namespace gimnet::inline GIMNET_GIMI_NAMESPACE

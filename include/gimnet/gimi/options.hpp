@@ -6,10 +6,11 @@
 #include <string>
 
 #include "gimnet/gimi/message.hpp"
+#include "gimnet/gimi/namespace.hpp"
 #include "gimnet/gimi/outcome.hpp"
 #include "gimnet/gimi/records.hpp"
 
-namespace gimnet::inline v0_9 {
+namespace gimnet::inline GIMNET_GIMI_NAMESPACE {
 
 /// Most messages of one (destination, key) that may wait for their ACK: what one ACK can speak of.
 inline constexpr std::size_t kWindowMax = 64;
@@ -165,4 +166,4 @@ struct WatchOptions {
 /// that is not. A program that stops there calls Node::flush().
 enum class More : std::uint8_t { no, yes };
 
-}  // namespace gimnet::inline v0_9
+}  // namespace gimnet::inline GIMNET_GIMI_NAMESPACE

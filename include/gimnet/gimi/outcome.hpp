@@ -11,9 +11,10 @@
 #include <utility>
 #include <variant>
 
+#include "gimnet/gimi/namespace.hpp"
 #include "gimnet/gimi_types.h"
 
-namespace gimnet::inline v0_9 {
+namespace gimnet::inline GIMNET_GIMI_NAMESPACE {
 
 /// The longest wait of a call. 0 does not wait; kForever (any negative time) waits without a limit.
 using Timeout = std::chrono::milliseconds;
@@ -194,4 +195,4 @@ class [[nodiscard]] Outcome<void> {
   Failure failure_;
 };
 
-}  // namespace gimnet::inline v0_9
+}  // namespace gimnet::inline GIMNET_GIMI_NAMESPACE

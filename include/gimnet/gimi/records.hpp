@@ -8,10 +8,11 @@
 #include <vector>
 
 #include "gimnet/gimi/message.hpp"
+#include "gimnet/gimi/namespace.hpp"
 
 // The records of a hub, its nodes and its services. Value types.
 
-namespace gimnet::inline v0_9 {
+namespace gimnet::inline GIMNET_GIMI_NAMESPACE {
 
 /// A way to deliver: `stream` every message, in order, the oldest going when its queue at the
 /// hub is full; `latest` only the newest of those that wait; `sync` at most a window of messages
@@ -193,4 +194,4 @@ struct ConnectionRecord {
   std::uint64_t missed = 0;      ///< messages that its subscriptions missed, as it says
 };
 
-}  // namespace gimnet::inline v0_9
+}  // namespace gimnet::inline GIMNET_GIMI_NAMESPACE

@@ -8,12 +8,13 @@
 #include <utility>
 
 #include "gimnet/gimi/message.hpp"
+#include "gimnet/gimi/namespace.hpp"
 #include "gimnet/gimi/outcome.hpp"
 #include "gimnet/gimi_requests.h"
 
 // Requests and what becomes of them. Value types.
 
-namespace gimnet::inline v0_9 {
+namespace gimnet::inline GIMNET_GIMI_NAMESPACE {
 
 /// Whether the other program may have done the work of a request.
 enum class Ran : std::int32_t { no = GIMI_RAN_NO, maybe = GIMI_RAN_MAYBE, yes = GIMI_RAN_YES };
@@ -71,4 +72,4 @@ class Reply {
   gimi_reply ended_;
 };
 
-}  // namespace gimnet::inline v0_9
+}  // namespace gimnet::inline GIMNET_GIMI_NAMESPACE

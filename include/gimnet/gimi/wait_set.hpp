@@ -8,12 +8,13 @@
 #include <vector>
 
 #include "gimnet/gimi/conversions.hpp"
+#include "gimnet/gimi/namespace.hpp"
 #include "gimnet/gimi/options.hpp"
 #include "gimnet/gimi/outcome.hpp"
 
 // Waiting for many things with one thread. Part of gimnet/gimi.hpp.
 
-namespace gimnet::inline v0_9 {
+namespace gimnet::inline GIMNET_GIMI_NAMESPACE {
 
 /// Subscriptions, Queues (of accepted services too), Answers, Watches, PendingReplies, Publishers
 /// (whose subscribers change), ConnectionWatches and Nodes, of which wait() tells which have
@@ -79,4 +80,4 @@ class WaitSet {
   detail::SharedHandle handle_;
 };
 
-}  // namespace gimnet::inline v0_9
+}  // namespace gimnet::inline GIMNET_GIMI_NAMESPACE
