@@ -83,12 +83,12 @@ class Executor {
       return !reply;
     });
   }
-  /// Calls `callback()` each time when `period` has passed since it was due last. What is missed
-  /// while others are called is left out.
+  /// Calls `callback()` each time when `period` has passed since it was due last, 1 ms to 100
+  /// years. What is missed while others are called is left out.
   template <class Callback>
   Id every(Timeout period, Callback callback) {
     auto timer = std::make_shared<Timer>();
-    timer->period = std::max(period, Timeout{1});
+    timer->period = std::clamp(period, Timeout{1}, kPeriodMax);
     timer->due = Clock::now() + timer->period;
     timer->call = std::move(callback);
     timers_.emplace(++last_, std::move(timer));
@@ -130,6 +130,8 @@ class Executor {
 
  private:
   using Clock = std::chrono::steady_clock;
+  /// A later time could be more than a time_point holds.
+  static constexpr Timeout kPeriodMax = std::chrono::hours(24 * 365 * 100);
   struct Member {
     gimi_handle handle = 0;
     std::function<bool()> call;  ///< false: nothing more comes

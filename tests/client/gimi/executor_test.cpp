@@ -308,5 +308,13 @@ TEST_F(ExecutorTest, MembersComeAndGoWhileOthersWait) {
   EXPECT_GE(taken, kMessages);
 }
 
+TEST_F(ExecutorTest, TheLongestPeriodIsNotOverAtOnce) {
+  int calls = 0;
+  executor_.every(Timeout::max(), [&] { ++calls; });
+  executor_.every(Timeout{20}, [&] { executor_.stop(); });
+  EXPECT_TRUE(executor_.run());
+  EXPECT_EQ(calls, 0);
+}
+
 }  // namespace
 }  // namespace gimnet
