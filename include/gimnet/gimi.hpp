@@ -46,7 +46,7 @@
 // no limit, kNoWait does not wait. Only the end of a handle waits without one, a second at most:
 // Node::close(), and the last Publisher, Subscription or Watch. Callbacks: the library calls none.
 // Received messages wait in queues, which the program empties when it has time; an Executor calls
-// back in the thread that runs it.
+// back in the thread that runs it. Texts: a NUL in one becomes U+FFFD, which no name may have.
 
 namespace gimnet::inline GIMNET_GIMI_NAMESPACE {
 
@@ -61,7 +61,12 @@ class Node : public HubAccess {
   /// Joins. Errors: no_hub, no_host, timeout, bad_version, name_taken, bad_name, refused,
   /// bad_argument, protocol, system.
   static Outcome<Node> join(const NodeOptions& options) {
-    const gimi_node_options how = detail::options_of(options);
+    if (options.shard == UINT8_MAX)
+      return Failure{Status::bad_argument, "cannot join: shard is 255, not 0 to 254"};
+    NodeOptions given = options;
+    for (std::string* text : {&given.name, &given.hub, &given.description, &given.proxy})
+      *text = detail::c_text(*text);
+    const gimi_node_options how = detail::options_of(given);
     gimi_handle handle = 0;
     const gimi_status status = gimi_join(&how, &handle);
     if (status != GIMI_OK) return failure_of(status);
@@ -119,7 +124,7 @@ class Node : public HubAccess {
                          Timeout timeout = Timeout{5000}) const {
     const gimi_send_options how = detail::options_of(options);
     return detail::made<Sender>([&](gimi_handle* made) {
-      return gimi_sender_to_service(handle_, std::string(service).c_str(), &how,
+      return gimi_sender_to_service(handle_, detail::c_text(service).c_str(), &how,
                                     milliseconds_of(timeout), made);
     });
   }
@@ -188,18 +193,22 @@ class Node : public HubAccess {
   /// node without a name), limit.
   Outcome<Publisher> advertise(std::string_view name, const PublishOptions& options = {},
                                Timeout timeout = Timeout{5000}) const {
-    const gimi_publish_options how = detail::options_of(options, timeout);
+    const std::string metadata = detail::c_text(options.metadata);
+    gimi_publish_options how = detail::options_of(options, timeout);
+    how.metadata = metadata.c_str();
     return detail::made<Publisher>([&](gimi_handle* made) {
-      return gimi_advertise(handle_, std::string(name).c_str(), &how, made);
+      return gimi_advertise(handle_, detail::c_text(name).c_str(), &how, made);
     });
   }
   /// Lists the service `own name/name`, to which others send, until the node is closed. Errors: as
   /// advertise().
   Outcome<Queue> accept(std::string_view name, const AcceptOptions& options = {},
                         Timeout timeout = Timeout{5000}) const {
-    const gimi_accept_options how = detail::options_of(options, timeout);
+    const std::string metadata = detail::c_text(options.metadata);
+    gimi_accept_options how = detail::options_of(options, timeout);
+    how.metadata = metadata.c_str();
     return detail::made<Queue>([&](gimi_handle* made) {
-      return gimi_accept(handle_, std::string(name).c_str(), &how, made);
+      return gimi_accept(handle_, detail::c_text(name).c_str(), &how, made);
     });
   }
   /// Subscribes to a service by its full name; it need not exist yet. Each call makes a queue of
@@ -211,7 +220,7 @@ class Node : public HubAccess {
                                   const SubscribeOptions& options = {}) const {
     const gimi_subscribe_options how = detail::options_of(options);
     return detail::made<Subscription>([&](gimi_handle* made) {
-      return gimi_subscribe(handle_, std::string(full_name).c_str(), &how, made);
+      return gimi_subscribe(handle_, detail::c_text(full_name).c_str(), &how, made);
     });
   }
 
@@ -226,7 +235,7 @@ class Node : public HubAccess {
     const gimi_bytes bytes{data.data(), data.size()};
     gimi_reply ended{};
     const gimi_status status =
-        gimi_ask(handle_, std::string(service).c_str(), &bytes, &how, &ended);
+        gimi_ask(handle_, detail::c_text(service).c_str(), &bytes, &how, &ended);
     return Reply(status, ended);
   }
   /// The same without waiting for the end. Errors: as a request that was not sent.
@@ -236,7 +245,7 @@ class Node : public HubAccess {
     const gimi_request_options how = detail::options_of(options, timeout);
     const gimi_bytes bytes{data.data(), data.size()};
     return detail::made<PendingReply>([&](gimi_handle* made) {
-      return gimi_ask_later(handle_, std::string(service).c_str(), &bytes, &how, made);
+      return gimi_ask_later(handle_, detail::c_text(service).c_str(), &bytes, &how, made);
     });
   }
   /// Lists the service `own name/name`, which answers requests. Errors: as advertise().
@@ -245,7 +254,7 @@ class Node : public HubAccess {
     how.struct_size = sizeof how;
     how.timeout_ms = milliseconds_in_options(timeout);
     return detail::made<Answers>([&](gimi_handle* made) {
-      return gimi_answer(handle_, std::string(name).c_str(), &how, made);
+      return gimi_answer(handle_, detail::c_text(name).c_str(), &how, made);
     });
   }
 
@@ -256,7 +265,7 @@ class Node : public HubAccess {
   /// not_connected.
   Outcome<void> take_name(std::string_view name, Timeout timeout = Timeout{5000}) const {
     return detail::outcome_of(
-        gimi_take_name(handle_, std::string(name).c_str(), milliseconds_of(timeout)));
+        gimi_take_name(handle_, detail::c_text(name).c_str(), milliseconds_of(timeout)));
   }
   /// Goes on without a name, and without services until it takes one. Errors: not_found, timeout,
   /// not_connected.
@@ -275,18 +284,17 @@ class Node : public HubAccess {
     std::uint32_t subjects = options.nodes ? GIMI_WATCH_NODES : 0;
     if (options.services) subjects |= GIMI_WATCH_SERVICES;
     return detail::made<Watch>([&](gimi_handle* made) {
-      return gimi_watch(handle_, std::string(pattern).c_str(), subjects != 0 ? subjects : nothing,
-                        milliseconds_of(timeout), made);
+      return gimi_watch(handle_, detail::c_text(pattern).c_str(),
+                        subjects != 0 ? subjects : nothing, milliseconds_of(timeout), made);
     });
   }
 
   /// A node by its name, or by its id as text. Errors: not_found, bad_name, timeout, not_connected.
   /// An id as text is not asked for; an answer for a name is remembered for a second.
   Outcome<Peer> find(std::string_view name, Timeout timeout = Timeout{5000}) const {
-    if (const auto id = Peer::parse(name)) return *id;
     Peer peer;
     const gimi_status status =
-        gimi_find(handle_, std::string(name).c_str(), milliseconds_of(timeout), &peer.id);
+        gimi_find(handle_, detail::c_text(name).c_str(), milliseconds_of(timeout), &peer.id);
     if (status != GIMI_OK) return failure_of(status);
     return peer;
   }
@@ -302,14 +310,15 @@ class Node : public HubAccess {
   Outcome<std::vector<NodeRecord>> nodes(std::string_view pattern = {},
                                          Timeout timeout = Timeout{5000}) const {
     return detail::listed<gimi_node_record>([&](gimi_list* list) {
-      return gimi_nodes(handle_, std::string(pattern).c_str(), milliseconds_of(timeout), list);
+      return gimi_nodes(handle_, detail::c_text(pattern).c_str(), milliseconds_of(timeout), list);
     });
   }
   /// Services whose full name matches, ascending group ids.
   Outcome<std::vector<ServiceRecord>> services(std::string_view pattern = {},
                                                Timeout timeout = Timeout{5000}) const {
     return detail::listed<gimi_service_record>([&](gimi_list* list) {
-      return gimi_services(handle_, std::string(pattern).c_str(), milliseconds_of(timeout), list);
+      return gimi_services(handle_, detail::c_text(pattern).c_str(), milliseconds_of(timeout),
+                           list);
     });
   }
 

@@ -49,7 +49,7 @@ class Request {
   }
   /// `code` and `sentence` are the program's own. Errors: as reply().
   Outcome<void> fail(std::int32_t code, std::string_view sentence) {
-    return detail::outcome_of(gimi_fail_request(&request_, code, std::string(sentence).c_str()));
+    return detail::outcome_of(gimi_fail_request(&request_, code, detail::c_text(sentence).c_str()));
   }
 
  private:

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -36,6 +37,15 @@ using SharedHandle = std::shared_ptr<const Handle>;
 [[nodiscard]] inline Outcome<void> outcome_of(gimi_status status) {
   if (status == GIMI_OK) return {};
   return failure_of(status);
+}
+
+/// Text for C, which a NUL would end: U+FFFD stands in its place. No name has that, so that it is
+/// refused; other text shows it.
+[[nodiscard]] inline std::string c_text(std::string_view text) {
+  std::string whole(text);
+  for (std::size_t at = 0; (at = whole.find('\0', at)) != std::string::npos;)
+    whole.replace(at, 1, "\xEF\xBF\xBD");
+  return whole;
 }
 
 [[nodiscard]] inline gimi_key key_of(MessageKey key) { return {key.type, key.instance}; }

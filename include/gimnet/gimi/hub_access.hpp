@@ -64,7 +64,7 @@ class HubAccess {
   Outcome<std::string> kick(Peer node, std::string_view reason = {},
                             Timeout timeout = Timeout{5000}) const {
     return detail::text([&](char* remark, std::size_t size) {
-      return gimi_kick(handle_, node.id, std::string(reason).c_str(), milliseconds_of(timeout),
+      return gimi_kick(handle_, node.id, detail::c_text(reason).c_str(), milliseconds_of(timeout),
                        remark, size);
     });
   }
@@ -89,7 +89,7 @@ class HubAccess {
   /// Errors: bad_argument (no URL, a name that is there, another machine without `insecure`).
   Outcome<void> add_link(std::string_view url, std::string_view name = {}, std::uint16_t cost = 0,
                          std::string_view proxy = {}, Timeout timeout = Timeout{5000}) const {
-    const std::string texts[] = {std::string(url), std::string(name), std::string(proxy)};
+    const std::string texts[] = {detail::c_text(url), detail::c_text(name), detail::c_text(proxy)};
     const gimi_link_options link{sizeof link, texts[0].c_str(), texts[1].c_str(), cost,
                                  0,           texts[2].c_str()};
     return detail::outcome_of(gimi_add_link(handle_, &link, milliseconds_of(timeout)));
@@ -97,20 +97,20 @@ class HubAccess {
   /// Ends a link that the hub dials. Errors: not_found.
   Outcome<void> remove_link(std::string_view name, Timeout timeout = Timeout{5000}) const {
     return detail::outcome_of(
-        gimi_remove_link(handle_, std::string(name).c_str(), milliseconds_of(timeout)));
+        gimi_remove_link(handle_, detail::c_text(name).c_str(), milliseconds_of(timeout)));
   }
   /// Fixes the cost of a link that the hub dials; 0: measured. Errors: not_found.
   Outcome<void> set_link_cost(std::string_view name, std::uint16_t cost,
                               Timeout timeout = Timeout{5000}) const {
     return detail::outcome_of(
-        gimi_set_link_cost(handle_, std::string(name).c_str(), cost, milliseconds_of(timeout)));
+        gimi_set_link_cost(handle_, detail::c_text(name).c_str(), cost, milliseconds_of(timeout)));
   }
   /// error, warning, info, debug or off. The level before. Errors: bad_argument, denied.
   Outcome<std::string> set_hub_log_level(std::string_view level,
                                          Timeout timeout = Timeout{5000}) const {
     return detail::text([&](char* before, std::size_t size) {
-      return gimi_set_hub_log_level(handle_, std::string(level).c_str(), milliseconds_of(timeout),
-                                    before, size);
+      return gimi_set_hub_log_level(handle_, detail::c_text(level).c_str(),
+                                    milliseconds_of(timeout), before, size);
     });
   }
 

@@ -48,7 +48,7 @@ struct NodeOptions {
   /// A node with a name that crashed has its id and name again at once: its session token stands in
   /// a file of the user's runtime folder while it lives. false: in memory only.
   bool keep_token = true;
-  /// Shard of the hub wished for; honoured by a hub started with `--placement hint`.
+  /// Shard of the hub wished for, 0..254; honoured by a hub started with `--placement hint`.
   std::optional<std::uint8_t> shard{};
   /// If the name is taken, join as NAME-2, NAME-3 ... NAME-99.
   bool number_if_taken = false;

@@ -181,14 +181,14 @@ gimi_status gimi_drain(gimi_handle node, int32_t timeout_ms) {
 }
 
 gimi_status gimi_find(gimi_handle node, const char* name, int32_t timeout_ms, gimi_peer* peer) {
+  if (peer != nullptr) *peer = 0;
   if (name == nullptr || peer == nullptr) return is_null("gimi_find(): name or peer");
-  *peer = 0;
-  if (const auto id = Peer::parse(name)) {
+  return ask_nif(node, "find the node '" + text_of(name) + "'", [&](Core& core) {
+    const auto id = Peer::parse(name);
+    if (!id) return nif_resolve(core.node(), name, peer, timeout_ms);
     *peer = id->id;
-    return GIMI_OK;
-  }
-  return ask_nif(node, "find the node '" + text_of(name) + "'",
-                 [&](Core& core) { return nif_resolve(core.node(), name, peer, timeout_ms); });
+    return NIF_OK;
+  });
 }
 
 gimi_status gimi_name_of(gimi_handle node, gimi_peer peer, int32_t timeout_ms, char* name,

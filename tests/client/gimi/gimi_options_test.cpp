@@ -1,11 +1,17 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstring>
+#include <functional>
 #include <span>
+#include <string>
 #include <typeinfo>
+#include <vector>
 
 #include "gimnet/gimi.h"
+#include "gimnet/gimi.hpp"
 #include "tests/client/gimi/support/hub_process.hpp"
 
 // Options of gimnet/gimi.h whose values are outside their ranges.
@@ -89,6 +95,26 @@ TEST_F(GimiOptions, ALeaseIsRefusedInEachOfItsMembers) {
   options.safe_message = {};
   options.lease_ms = 1;
   EXPECT_EQ(gimi_accept(node_, "a", &options, &queue), GIMI_BAD_ARGUMENT);
+}
+
+TEST_F(GimiOptions, AnIdIsFoundByALiveNodeOnly) {
+  gimi_peer peer = 0;
+  EXPECT_EQ(gimi_find(0, "7.17", 0, &peer), GIMI_CLOSED);
+  EXPECT_EQ(gimi_find(node_, "7.17", 0, &peer), GIMI_OK);
+  EXPECT_EQ(peer, 7u << 20 | 17u);
+}
+
+// In C a NUL ends a text: U+FFFD stands for it.
+TEST_F(GimiOptions, TextOfCppIsNotCutAtANul) {
+  using namespace std::string_literals;
+  const Node node("viewer", hub_.url());
+  EXPECT_TRUE(node.advertise("a\0b"s).is(Status::bad_name));
+  EXPECT_TRUE(node.subscribe("robot/a\0b"s).is(Status::bad_name));
+  EXPECT_TRUE(node.find("robot\0"s).is(Status::bad_name));
+  EXPECT_TRUE(Node::join({.name = "x\0y"s, .hub = hub_.url()}).is(Status::bad_name));
+  const auto publisher = node.advertise("odom", {.metadata = "m\0d"s}).or_throw();
+  EXPECT_EQ(node.services("viewer/odom").or_throw().at(0).metadata, "m\uFFFDd");
+  EXPECT_TRUE(Node::join({.hub = hub_.url(), .shard = std::uint8_t{255}}).is(Status::bad_argument));
 }
 
 }  // namespace

@@ -50,6 +50,7 @@ std::string wrong_call(const Node& node, const Publisher& publisher,
   if (!is_forked(node.sender("robot/odom"))) return "sender to a service";
   if (!is_forked(node.send(Peer{1}, "x"))) return "send";
   if (!is_forked(node.find("robot"))) return "find";
+  if (!is_forked(node.find("7.17"))) return "find by an id";
   if (!is_forked(node.nodes())) return "nodes";
   if (!is_forked(node.take_name("x"))) return "take_name";
   if (!is_forked(node.flush())) return "flush";
