@@ -96,7 +96,8 @@ typedef struct gimi_connection_record {
   uint8_t reserved[7];
 } gimi_connection_record;
 
-/** A link of a hub, as that hub tells. */
+/** A link of a hub, as that hub tells. It keeps its members: what comes later of a link gets an
+ * array of its own. */
 typedef struct gimi_edge {
   uint32_t hub_id;
   uint32_t cost;
@@ -156,6 +157,11 @@ typedef struct gimi_trace_hop_record {
   uint32_t hub_id;
   uint32_t reserved;
 } gimi_trace_hop_record;
+
+/** The records of an event grow as those of lists, and are read by pointers: at least so many bytes
+ * behind them are zero. So members that an older library does not have are zero here, too. In all
+ * versions of libgimnet.so.1 these two records grow by no more than that. */
+#define GIMI_RECORD_ROOM_BYTES 256
 
 /** A node or a service that is there or changed, or neither for what is about the watch itself. It
  * owns its memory until gimi_watch_event_release(). */

@@ -36,10 +36,9 @@
  * leave what you do not need zero; zero always means the default. A program goes on with a library
  * that has more members: those it does not give are zero, and it gets those that it has. One with a
  * library that has fewer is refused only if it sets one of the others. Structures without it, of
- * which programs keep arrays (nif_bytes, nif_incoming, nif_subscription and the records of lists),
- * keep their members while NIF_VERSION_MAJOR is the same: what comes later gets a function or a
- * structure of its own. nif_watched, nif_reply and the lists are made by the library alone and may
- * get members at their end: read them where the library has put them, and do not copy them.
+ * which programs keep arrays or which the library makes (nif_bytes, nif_incoming, nif_subscription,
+ * nif_watched, nif_reply, lists and their records), keep their members while NIF_VERSION_MAJOR is
+ * the same: what comes later gets a function or a structure of its own.
  *
  * docs/protocol.md describes the bytes on the wire, docs/nif.md how this library uses them, and
  * why.

@@ -95,10 +95,11 @@ class Programs(unittest.TestCase):
         cls.addClassCleanup(hub.kill)
         cls.hub = hub.stdout.readline().split()[1]
 
-    def run_program(self, *words):
-        ran = subprocess.run(list(map(str, words)), stdin=subprocess.DEVNULL, capture_output=True, text=True, env=self.environment,
-                             timeout=TIMEOUT_S, check=False)
-        self.assertEqual((ran.returncode, ran.stdout), (0, "all is as it was\n"), f"{words[0]}: {ran.stderr}")
+    def run_program(self, *words, proves=None, **environment):
+        ran = subprocess.run(list(map(str, words)), stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                             env=self.environment | environment, timeout=TIMEOUT_S, check=False)
+        expected = (0, "all is as it was\n") if proves is None else (proves, "")
+        self.assertEqual((ran.returncode, ran.stdout), expected, f"{words[0]}: {ran.stderr}")
 
     def test_in_c_run(self):
         for folder in self.folders:
@@ -107,6 +108,24 @@ class Programs(unittest.TestCase):
     def test_in_cpp_run_with_plugins_of_every_version(self):
         for folder, of_plugin in itertools.product(self.folders, self.folders):
             self.run_program(folder / "program_cpp", self.hub, of_plugin / "plugin.so")
+
+    def test_run_with_a_later_library_that_uses_the_reserved_room(self):
+        later = self.folders[0] / "later.so"
+        subprocess.run(["gcc", "-std=c11", "-shared", "-fPIC", f"-I{public_headers.INCLUDE}", kept.SOURCES / "later.c", "-ldl", "-o", later],
+                       stdin=subprocess.DEVNULL, timeout=TIMEOUT_S, check=True)
+        self.run_program(self.folders[0] / "program_c", self.hub, proves=77, LD_PRELOAD=str(later), GIMNET_TEST_PROOF="1")
+        for folder in self.folders:
+            self.run_program(folder / "program_c", self.hub, LD_PRELOAD=str(later))
+            self.run_program(folder / "program_cpp", self.hub, folder / "plugin.so", LD_PRELOAD=str(later))
+
+
+class Cpp(unittest.TestCase):
+    def test_compiles_without_exceptions_and_without_rtti(self):
+        program = '#include "gimnet/gimi.hpp"\nint main() { return gimnet::Node::join({.name = "x"}) ? 0 : 1; }\n'
+        for options in (["-fno-exceptions"], ["-fno-rtti"], ["-fno-exceptions", "-fno-rtti"]):
+            with self.subTest(options):
+                subprocess.run(["g++", "-std=c++20", "-fsyntax-only", "-Wall", "-Wextra", "-Werror", *options,
+                                f"-I{public_headers.INCLUDE}", "-x", "c++", "-"], input=program, text=True, timeout=TIMEOUT_S, check=True)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,8 @@
 #include "client/gimi/record_list.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cstddef>
 #include <cstring>
 #include <memory>
 
@@ -133,15 +135,22 @@ class NetworkList final : public RecordList {
   std::vector<gimi_network_hub_record> records_;
 };
 
+/// A record that programs read by a pointer. One with a newer header reads zeros behind it.
+template <class Record>
+struct RoomyRecord {
+  Record record{};
+  std::array<std::byte, GIMI_RECORD_ROOM_BYTES> room{};
+};
+
 /// The memory of a gimi_watch_event.
 struct EventStorage {
   explicit EventStorage(WatchEvent of) : event(std::move(of)) {
-    if (event.node) node = record_of(*event.node);
-    if (event.service) service = record_of(*event.service);
+    if (event.node) node.record = record_of(*event.node);
+    if (event.service) service.record = record_of(*event.service);
   }
   WatchEvent event;
-  gimi_node_record node{};
-  gimi_service_record service{};
+  RoomyRecord<gimi_node_record> node;
+  RoomyRecord<gimi_service_record> service;
 };
 
 }  // namespace
@@ -161,8 +170,8 @@ gimi_watch_event event_of(WatchEvent event) {
   told.hub_id = storage->event.hub_id;
   told.epoch = storage->event.epoch;
   told.version = storage->event.version;
-  if (storage->event.node) told.node = &storage->node;
-  if (storage->event.service) told.service = &storage->service;
+  if (storage->event.node) told.node = &storage->node.record;
+  if (storage->event.service) told.service = &storage->service.record;
   told.former_name = storage->event.former_name.c_str();
   told.why = storage->event.why.c_str();
   told.storage = storage.release();

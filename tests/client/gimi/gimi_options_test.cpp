@@ -104,6 +104,22 @@ TEST_F(GimiOptions, AnIdIsFoundByALiveNodeOnly) {
   EXPECT_EQ(peer, 7u << 20 | 17u);
 }
 
+// A program with a newer header reads there what this library does not have.
+TEST_F(GimiOptions, TheRoomBehindARecordOfAnEventIsZero) {
+  gimi_handle watch = 0;
+  gimi_watch_event event{};
+  ASSERT_EQ(gimi_watch(node_, "robot", GIMI_WATCH_NODES, 20'000, &watch), GIMI_OK);
+  while (event.node == nullptr) {
+    gimi_watch_event_release(&event);
+    ASSERT_EQ(gimi_watch_receive(watch, 20'000, &event), GIMI_OK);
+  }
+  const auto* room = reinterpret_cast<const std::byte*>(event.node + 1);
+  EXPECT_TRUE(std::all_of(room, room + GIMI_RECORD_ROOM_BYTES,
+                          [](std::byte byte) { return byte == std::byte{0}; }));
+  gimi_watch_event_release(&event);
+  EXPECT_EQ(gimi_close(watch), GIMI_OK);
+}
+
 // In C a NUL ends a text: U+FFFD stands for it.
 TEST_F(GimiOptions, TextOfCppIsNotCutAtANul) {
   using namespace std::string_literals;
