@@ -17,6 +17,8 @@ extern "C" {
 #define GIMI_WINDOW_MAX 64
 /** Most payload bytes of them. A larger message goes when no other waits. */
 #define GIMI_WINDOW_BYTES_MAX ((size_t)1 << 20)
+/** Largest message. */
+#define GIMI_MESSAGE_BYTES_MAX ((size_t)1 << 30)
 /** Messages that a queue keeps if nobody says otherwise, and at most. */
 #define GIMI_QUEUE_MESSAGES_DEFAULT 64
 #define GIMI_QUEUE_MESSAGES_MAX ((size_t)1 << 24)

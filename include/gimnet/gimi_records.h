@@ -19,7 +19,8 @@ typedef struct gimi_list {
 } gimi_list;
 
 /** Copies a record to `record`, as much of it as record_size, its size in this header, says; what
- * an older library does not have is zero. GIMI_BAD_ARGUMENT: NULL, or no such index. */
+ * an older library does not have is zero. GIMI_BAD_ARGUMENT: NULL, no such index, or a size over
+ * 4,096. */
 GIMNET_API gimi_status gimi_list_get(const gimi_list* list, size_t index, void* record,
                                      size_t record_size);
 /** Gives the memory back and empties the struct; does nothing with an empty one. NULL is ignored.

@@ -191,6 +191,14 @@ inline gimi_status bad_at_full() {
   return fail(GIMI_BAD_ARGUMENT, "at_full is none of GIMI_OVERWRITE_OLDEST, GIMI_STOP_READING");
 }
 
+/// Of a queue for more than GIMI_QUEUE_MESSAGES_MAX messages.
+inline std::string too_long(std::size_t messages) {
+  return "a queue of " + std::to_string(messages) + " messages; 16,777,216 are the most";
+}
+inline gimi_status bad_length(std::size_t messages) {
+  return fail(GIMI_BAD_ARGUMENT, "cannot make " + too_long(messages));
+}
+
 /// Copies as much as fits, cut between characters. REQUIRES: size is not 0.
 inline void copy_text(std::string_view text, char* buffer, std::size_t size) {
   const std::string_view kept = nif::cut_text(text, size - 1);

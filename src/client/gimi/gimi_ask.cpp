@@ -84,6 +84,8 @@ gimi_status gimi_watch_receive(gimi_handle watch, int32_t timeout_ms, gimi_watch
 
 gimi_status gimi_hub(gimi_handle node, gimi_hub_question question, uint32_t hub_id,
                      int32_t timeout_ms, gimi_list* list) {
+  if (list == nullptr) return is_null("the list");
+  *list = {};
   const Timeout timeout = timeout_of(timeout_ms);
   const auto who = [&](Core& core) { return Asking{core.node(), hub_id}; };
   switch (question) {
@@ -110,6 +112,8 @@ gimi_status gimi_ping(gimi_handle node, gimi_peer to, gimi_lane lane, const gimi
                       int32_t timeout_ms, int64_t* round_trip_ns) {
   if (round_trip_ns == nullptr) return is_null("gimi_ping(): round_trip_ns");
   *round_trip_ns = 0;
+  if (echo != nullptr && echo->data == nullptr && echo->size != 0)
+    return is_null("gimi_ping(): data of echo");
   return with_core(node, [&](Core& core) -> gimi_status {
     Lane wanted = Lane::normal;
     if (!read_lane(lane, wanted)) return bad_lane(lane);
@@ -126,6 +130,7 @@ gimi_status gimi_ping(gimi_handle node, gimi_peer to, gimi_lane lane, const gimi
 
 gimi_status gimi_trace(gimi_handle node, gimi_peer to, gimi_lane lane, int32_t timeout_ms,
                        int64_t* round_trip_ns, gimi_list* way_back) {
+  if (way_back != nullptr) *way_back = {};
   if (round_trip_ns == nullptr) return is_null("gimi_trace(): round_trip_ns");
   *round_trip_ns = 0;
   return list_with(node, way_back, [&](Core& core) -> Outcome<std::vector<TraceHop>> {

@@ -30,6 +30,10 @@ Outcome<NodeOptions> read(const gimi_node_options& given) {
   options.number_if_taken = given.number_if_taken != 0;
   options.socket_receive_bytes = given.socket_receive_bytes;
   if (given.last_message_bytes != 0) options.last_message_bytes = given.last_message_bytes;
+  if (given.message_bytes_max > GIMI_MESSAGE_BYTES_MAX)
+    return Failure{Status::bad_argument, "cannot join: message_bytes_max is over 1 GiB"};
+  if (given.queue_messages > GIMI_QUEUE_MESSAGES_MAX)
+    return Failure{Status::bad_argument, "cannot join: " + too_long(given.queue_messages)};
   if (given.message_bytes_max != 0) options.message_bytes_max = given.message_bytes_max;
   if (given.receive_bytes != 0) options.receive_bytes = given.receive_bytes;
   if (given.queue_messages != 0) options.queue_messages = given.queue_messages;

@@ -76,6 +76,7 @@ gimi_status gimi_queue(gimi_handle node, gimi_key key, const gimi_queue_options*
     return with_options(options, "make a queue", "gimi_queue_options", [&](const auto& given) {
       QueueOptions how{given.messages};
       if (!read_at_full(given.at_full, how.at_full)) return bad_at_full();
+      if (given.messages > GIMI_QUEUE_MESSAGES_MAX) return bad_length(given.messages);
       return give<QueueObject>(queue, found.core, found.core->inbox().queue(key_of(key), &how));
     });
   });
@@ -153,6 +154,7 @@ void gimi_batch_release(gimi_batch* batch) {
 
 gimi_status gimi_resize(gimi_handle source, size_t messages) {
   return with_source(source, [&](Source& found) -> gimi_status {
+    if (messages > GIMI_QUEUE_MESSAGES_MAX) return bad_length(messages);
     found.core->inbox().resize(found.queue, messages);
     return GIMI_OK;
   });

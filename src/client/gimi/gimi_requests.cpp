@@ -197,8 +197,8 @@ void gimi_reply_release(gimi_reply* reply) {
 
 gimi_status gimi_answer(gimi_handle node, const char* name, const gimi_answer_options* options,
                         gimi_handle* answers) {
+  if (answers != nullptr) *answers = 0;
   if (name == nullptr || answers == nullptr) return is_null("gimi_answer(): name or answers");
-  *answers = 0;
   return with<NodeObject>(node, [&](NodeObject& found) {
     return with_options(options, "answer", "gimi_answer_options", [&](const auto& given) {
       Core& core = *found.core;

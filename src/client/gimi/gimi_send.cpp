@@ -77,8 +77,8 @@ extern "C" {
 
 gimi_status gimi_accept(gimi_handle node, const char* name, const gimi_accept_options* options,
                         gimi_handle* queue) {
+  if (queue != nullptr) *queue = 0;
   if (name == nullptr || queue == nullptr) return is_null("gimi_accept(): name or queue");
-  *queue = 0;
   return with<NodeObject>(node, [&](NodeObject& found) {
     return with_options(options, "accept", "gimi_accept_options", [&](const auto& given) {
       const gimi_bytes& safe = given.safe_message;
@@ -88,6 +88,7 @@ gimi_status gimi_accept(gimi_handle node, const char* name, const gimi_accept_op
       how.key = key_of(given.key);
       how.queue.messages = given.messages;
       if (!read_at_full(given.at_full, how.queue.at_full)) return bad_at_full();
+      if (given.messages > GIMI_QUEUE_MESSAGES_MAX) return bad_length(given.messages);
       how.metadata = text_of(given.metadata);
       Core& core = *found.core;
       MessageQueue& made = core.inbox().queue(how.key, &how.queue);
@@ -102,9 +103,9 @@ gimi_status gimi_accept(gimi_handle node, const char* name, const gimi_accept_op
 gimi_status gimi_sender_to_service(gimi_handle node, const char* full_name,
                                    const gimi_send_options* options, int32_t timeout_ms,
                                    gimi_handle* sender) {
+  if (sender != nullptr) *sender = 0;
   if (full_name == nullptr || sender == nullptr)
     return is_null("gimi_sender_to_service(): full_name or sender");
-  *sender = 0;
   return with<NodeObject>(node, [&](NodeObject& found) {
     return with_send_options(options, [&](const SendOptions& how) {
       StreamTable::Stream stream = found.core->streams().standing(full_name);

@@ -1,6 +1,6 @@
 #include <algorithm>
-#include <cmath>
 #include <memory>
+#include <string>
 
 #include "base/byte_buffer.hpp"
 #include "client/gimi/api.hpp"
@@ -12,8 +12,26 @@ using namespace gimnet::gimi;
 
 namespace {
 
-/// The least rate of a subscription, in Hz, as hubs have it.
-constexpr double kRateMin = 0.001;
+/// Empty, or what is wrong with the wishes of a subscriber. The hub would not see it: of several
+/// subscriptions for one name it is told the widest.
+std::string fault_of(const gimi_subscribe_options& given) {
+  constexpr double kRateMin = 0.001;
+  constexpr double kRateMax = 1000.0;
+  constexpr std::uint32_t kWindowMax = 1024;
+  constexpr std::uint32_t kDepthMax = 64;
+  // Not a number is outside of every range.
+  if (given.rate_hz != 0.0 && !(given.rate_hz >= kRateMin && given.rate_hz <= kRateMax))
+    return "rate_hz is " + std::to_string(given.rate_hz) + ", not 0.001 to 1,000 or 0: no bound";
+  if (given.window > kWindowMax) return "window is over 1,024";
+  if (given.depth > kDepthMax) return "depth is over 64";
+  if (given.queue > GIMI_QUEUE_MESSAGES_MAX) return too_long(given.queue);
+  if (given.silence_ms < 0) return "silence_ms is negative; 0 is without an answer";
+  if (given.newest_only != 0 && given.queue > 1) {
+    return "newest_only keeps one message, so that a queue of " + std::to_string(given.queue) +
+           " has no use; leave one of them out";
+  }
+  return {};
+}
 
 }  // namespace
 
@@ -21,9 +39,9 @@ extern "C" {
 
 gimi_status gimi_advertise(gimi_handle node, const char* name, const gimi_publish_options* options,
                            gimi_handle* publisher) {
+  if (publisher != nullptr) *publisher = 0;
   if (name == nullptr || publisher == nullptr)
     return is_null("gimi_advertise(): name or publisher");
-  *publisher = 0;
   return with<NodeObject>(node, [&](NodeObject& found) {
     return with_options(options, "advertise", "gimi_publish_options", [&](const auto& given) {
       PublishOptions how;
@@ -78,7 +96,7 @@ gimi_status gimi_loan(gimi_handle publisher, size_t size, gimi_loaned* loan) {
   if (loan == nullptr) return is_null("gimi_loan(): loan");
   *loan = {};
   return with<PublisherObject>(publisher, [&](PublisherObject&) -> gimi_status {
-    if (size > NIF_MESSAGE_BYTES_MAX)
+    if (size > GIMI_MESSAGE_BYTES_MAX)
       return fail(GIMI_TOO_LARGE, "cannot lend " + std::to_string(size) + " bytes: at most 1 GiB");
     auto memory = std::make_unique<ByteBuffer>();
     if (!memory->reserve(std::max<std::size_t>(size, 1)))
@@ -190,9 +208,9 @@ gimi_status gimi_service_name(gimi_handle handle, char* name, size_t size) {
 
 gimi_status gimi_subscribe(gimi_handle node, const char* full_name,
                            const gimi_subscribe_options* options, gimi_handle* subscription) {
+  if (subscription != nullptr) *subscription = 0;
   if (full_name == nullptr || subscription == nullptr)
     return is_null("gimi_subscribe(): full_name or subscription");
-  *subscription = 0;
   return with<NodeObject>(node, [&](NodeObject& found) {
     return with_options(options, "subscribe", "gimi_subscribe_options", [&](const auto& given) {
       SubscribeOptions how;
@@ -204,22 +222,9 @@ gimi_status gimi_subscribe(gimi_handle node, const char* full_name,
       how.window = given.window;
       how.depth = given.depth;
       how.silence = Timeout{given.silence_ms};
-      if (given.silence_ms < 0) {
-        return fail(GIMI_BAD_ARGUMENT, "cannot subscribe to '" + text_of(full_name) +
-                                           "': silence_ms is negative; 0 is without an answer");
-      }
-      // The hub hears of the widest wish for a service alone.
-      const bool has_rate = how.rate_hz >= kRateMin && std::isfinite(how.rate_hz);
-      if (how.rate_hz != 0.0 && !has_rate) {
-        return fail(GIMI_BAD_ARGUMENT, "cannot subscribe to '" + text_of(full_name) +
-                                           "': rate_hz is no number from 0.001 on; leave it out "
-                                           "for every message");
-      }
-      if (how.newest_only && how.queue > 1) {
-        return fail(GIMI_BAD_ARGUMENT, "cannot subscribe to '" + text_of(full_name) +
-                                           "': newest_only keeps one message, so that a queue of " +
-                                           std::to_string(how.queue) +
-                                           " has no use; leave one of them out");
+      if (const std::string fault = fault_of(given); !fault.empty()) {
+        return fail(GIMI_BAD_ARGUMENT,
+                    "cannot subscribe to '" + text_of(full_name) + "': " + fault);
       }
       auto reading = found.core->services().subscribe(full_name, how);
       if (!reading) return fail(reading.failure());

@@ -85,8 +85,8 @@ gimi_status gimi_wait_set_remove(gimi_handle set, gimi_handle member) {
 
 gimi_status gimi_wait_set_wait(gimi_handle set, gimi_ready* ready, uint32_t ready_max,
                                size_t ready_size, int32_t timeout_ms, size_t* count) {
+  if (count != nullptr) *count = 0;
   if (ready == nullptr || count == nullptr) return is_null("gimi_wait_set_wait(): ready or count");
-  *count = 0;
   constexpr std::size_t kSizeMin = offsetof(gimi_ready, reserved);
   if (ready_max == 0 || ready_size < kSizeMin || ready_size > 4096)
     return fail(GIMI_BAD_ARGUMENT, "ready_max is 0, or ready_size is not sizeof(gimi_ready)");

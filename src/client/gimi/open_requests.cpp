@@ -6,6 +6,7 @@
 #include "base/clock.hpp"
 #include "base/endian.hpp"
 #include "client/gimi/loss_tally.hpp"
+#include "gimnet/gimi_options.h"
 #include "proto/frame/report.hpp"
 
 namespace gimnet::gimi {
@@ -92,6 +93,13 @@ void OpenRequests::learn(const std::string& service, StreamTable::Stream stream,
 
 Outcome<std::uint32_t> OpenRequests::open(const std::string& service, BytesView data,
                                           std::int64_t deadline_ns, const RequestOptions& options) {
+  if (data.size() > GIMI_MESSAGE_BYTES_MAX) {
+    return Failure{Status::too_large,
+                   "cannot ask " + service + ": the request is larger than 1 GiB"};
+  }
+  // Before it is an open one: there may be no memory.
+  std::vector<std::byte> message(proto::gimi::kRequestPrefix + data.size());
+  std::ranges::copy(data.span(), message.begin() + proto::gimi::kRequestPrefix);
   std::optional<Sending> sending;
   std::uint32_t number = 0;
   {
@@ -105,8 +113,7 @@ Outcome<std::uint32_t> OpenRequests::open(const std::string& service, BytesView 
     number = next_++;
     Open& made = open_[number];
     made.service = service;
-    made.message.resize(proto::gimi::kRequestPrefix + data.size());
-    std::ranges::copy(data.span(), made.message.begin() + proto::gimi::kRequestPrefix);
+    made.message = std::move(message);
     made.lane = options.lane;
     made.repeat = options.repeat;
     made.deadline_ns = deadline_ns;

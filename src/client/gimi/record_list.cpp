@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "client/gimi/failure.hpp"
+#include "client/nif/sized_struct.hpp"
 
 namespace gimnet::gimi {
 
@@ -187,6 +188,8 @@ gimi_status gimi_list_get(const gimi_list* list, size_t index, void* record, siz
     return gimnet::gimi::fail(GIMI_BAD_ARGUMENT, "gimi_list_get(): list or record is NULL");
   if (index >= list->count)
     return gimnet::gimi::fail(GIMI_BAD_ARGUMENT, "gimi_list_get(): the list has no such index");
+  if (record_size > gimnet::nif::kStructSizeMax)
+    return gimnet::gimi::fail(GIMI_BAD_ARGUMENT, "gimi_list_get(): record_size is no record's");
   std::memset(record, 0, record_size);
   std::memcpy(record, static_cast<const char*>(list->records) + index * list->record_size,
               std::min(record_size, list->record_size));

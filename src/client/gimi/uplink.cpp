@@ -7,6 +7,8 @@
 #include "base/clock.hpp"
 #include "base/random.hpp"
 #include "client/nif/api.hpp"
+#include "gimnet/gimi_options.h"
+#include "proto/gimi/request.hpp"
 
 namespace gimnet::gimi {
 
@@ -75,6 +77,10 @@ Failure failure_of(nif_status status, std::string_view doing) {
 
 nif_status Uplink::transmit(const Envelope& envelope, proto::gimi::MessageHeader header,
                             bool stamped, BytesView data, std::int32_t timeout_ms) const {
+  const bool is_request = header.operation == proto::gimi::MessageOperation::request;
+  const std::size_t own_bytes = is_request ? proto::gimi::kRequestPrefix : 0;
+  if (data.size() > GIMI_MESSAGE_BYTES_MAX + own_bytes)
+    return nif::fail(NIF_TOO_LARGE, "cannot send: the message is larger than 1 GiB");
   std::array<std::byte, proto::gimi::kMessagePrefixMax> prefix;
   const auto stamp = stamped ? std::optional(wall_now_ns()) : std::nullopt;
   const std::size_t prefix_size = proto::gimi::write_message_prefix(header, stamp, prefix);

@@ -121,9 +121,9 @@ nif_status nif_reverse(nif_node* node, uint32_t id, char* name, int32_t timeout_
 
 nif_status nif_list_nodes(nif_node* node, const char* pattern, nif_node_list** list,
                           int32_t timeout_ms) {
+  if (list != nullptr) *list = nullptr;
   return with_waiting_node(node, [&](Node& found) -> nif_status {
     if (list == nullptr) return fail(NIF_BAD_ARGUMENT, "cannot list: list is NULL");
-    *list = nullptr;
     if (const nif_status status = check_pattern(pattern); status != NIF_OK) return status;
     std::vector<ns::NodeRecord> records;
     ns::List request;
@@ -139,9 +139,9 @@ nif_status nif_list_nodes(nif_node* node, const char* pattern, nif_node_list** l
 
 nif_status nif_list_services(nif_node* node, const char* pattern, nif_service_list** list,
                              int32_t timeout_ms) {
+  if (list != nullptr) *list = nullptr;
   return with_waiting_node(node, [&](Node& found) -> nif_status {
     if (list == nullptr) return fail(NIF_BAD_ARGUMENT, "cannot list: list is NULL");
-    *list = nullptr;
     if (const nif_status status = check_pattern(pattern); status != NIF_OK) return status;
     std::vector<ns::ServiceRecord> records;
     ns::ServicesRequest request;
@@ -175,6 +175,8 @@ nif_status nif_advertise(nif_node* node, const nif_service* service, uint32_t* g
     request.direction = static_cast<ns::Direction>(known->direction);
     request.delivery = static_cast<ns::Delivery>(known->delivery);
     request.metadata = known->metadata != nullptr ? known->metadata : "";
+    if (request.metadata.size() > proto::kMetadataBytesMax)
+      return fail(NIF_BAD_ARGUMENT, "cannot advertise: the metadata is over 4,096 bytes");
     request.window = known->window;
     request.retain = known->retain != 0;
     if (!proto::valid_service_name(request.service)) {
@@ -320,11 +322,11 @@ nif_status nif_request(nif_node* node, uint8_t kind, uint16_t operation, const v
 nif_status nif_request_of_hub(nif_node* node, uint32_t hub_id, uint8_t kind, uint16_t operation,
                               const void* content, size_t size, nif_reply** reply,
                               int32_t timeout_ms) {
+  if (reply != nullptr) *reply = nullptr;
   return with_waiting_node(node, [&](Node& found) -> nif_status {
     if (reply == nullptr || (content == nullptr && size > 0)) {
       return fail(NIF_BAD_ARGUMENT, "cannot ask: reply or content is NULL");
     }
-    *reply = nullptr;
     if ((kind != NIF_NS && kind != NIF_CTRL) || operation >= proto::kAnswerBit ||
         size > NIF_REQUEST_BYTES_MAX || hub_id > gimnet::kHubIdMax) {
       return fail(NIF_BAD_ARGUMENT, "cannot ask: hub, kind, operation or size is out of range");

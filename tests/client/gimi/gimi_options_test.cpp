@@ -97,6 +97,150 @@ TEST_F(GimiOptions, ALeaseIsRefusedInEachOfItsMembers) {
   EXPECT_EQ(gimi_accept(node_, "a", &options, &queue), GIMI_BAD_ARGUMENT);
 }
 
+// The hub is told the widest of several subscriptions for one name, and so not these.
+TEST_F(GimiOptions, AWishOutsideItsRangeIsRefusedBesideAPlainSubscription) {
+  gimi_handle plain = 0;
+  gimi_handle made_one = 0;
+  ASSERT_EQ(gimi_subscribe(node_, "a/b", nullptr, &plain), GIMI_OK);
+  const auto refused = [&](const gimi_subscribe_options& options, const char* word) {
+    EXPECT_EQ(gimi_subscribe(node_, "a/b", &options, &made_one), GIMI_BAD_ARGUMENT) << word;
+    EXPECT_NE(std::strstr(gimi_error_text(), word), nullptr) << gimi_error_text();
+    EXPECT_EQ(made_one, 0u);
+  };
+  auto options = made<gimi_subscribe_options>();
+  for (const double rate : {std::nan(""), -1.0, HUGE_VAL, 1000.5, 0.0009}) {
+    options.rate_hz = rate;
+    refused(options, "rate_hz");
+  }
+  options = made<gimi_subscribe_options>();
+  options.window = 1025;
+  refused(options, "window");
+  options = made<gimi_subscribe_options>();
+  options.depth = 65;
+  refused(options, "depth");
+  options = made<gimi_subscribe_options>();
+  options.queue = GIMI_QUEUE_MESSAGES_MAX + 1;
+  refused(options, "16,777,216");
+  options = made<gimi_subscribe_options>();
+  options.rate_hz = 1000.0;
+  options.window = 1024;
+  options.depth = 64;
+  options.queue = GIMI_QUEUE_MESSAGES_MAX;
+  EXPECT_EQ(gimi_subscribe(node_, "a/b", &options, &made_one), GIMI_OK) << gimi_error_text();
+  EXPECT_EQ(gimi_close(made_one), GIMI_OK);
+  EXPECT_EQ(gimi_close(plain), GIMI_OK);
+}
+
+TEST_F(GimiOptions, SizesOverTheMostAreRefused) {
+  constexpr std::size_t kTooMany = GIMI_QUEUE_MESSAGES_MAX + 1;
+  gimi_handle queue = 0;
+  auto queue_options = made<gimi_queue_options>();
+  queue_options.messages = kTooMany;
+  EXPECT_EQ(gimi_queue(node_, {1, 1}, &queue_options, &queue), GIMI_BAD_ARGUMENT);
+  auto accept = made<gimi_accept_options>();
+  accept.messages = kTooMany;
+  EXPECT_EQ(gimi_accept(node_, "a", &accept, &queue), GIMI_BAD_ARGUMENT);
+  ASSERT_EQ(gimi_queue(node_, {1, 1}, nullptr, &queue), GIMI_OK);
+  EXPECT_EQ(gimi_resize(queue, kTooMany), GIMI_BAD_ARGUMENT);
+  EXPECT_EQ(gimi_resize(queue, kTooMany - 1), GIMI_OK);
+  EXPECT_EQ(gimi_close(queue), GIMI_OK);
+  auto join = made<gimi_node_options>();
+  join.hub = hub_.url().c_str();
+  join.queue_messages = kTooMany;
+  EXPECT_EQ(gimi_join(&join, &queue), GIMI_BAD_ARGUMENT);
+  join.queue_messages = 0;
+  join.message_bytes_max = GIMI_MESSAGE_BYTES_MAX + 1;
+  EXPECT_EQ(gimi_join(&join, &queue), GIMI_BAD_ARGUMENT);
+  const std::string metadata(4097, 'm');
+  auto publish = made<gimi_publish_options>();
+  publish.metadata = metadata.c_str();
+  EXPECT_EQ(gimi_advertise(node_, "a", &publish, &queue), GIMI_BAD_ARGUMENT);
+  EXPECT_NE(std::strstr(gimi_error_text(), "metadata"), nullptr) << gimi_error_text();
+  EXPECT_EQ(queue, 0u);
+}
+
+TEST_F(GimiOptions, AMessageOverOneGibibyteIsRefusedAndNotRead) {
+  const char byte = 'x';
+  gimi_handle publisher = 0;
+  gimi_handle sender = 0;
+  gimi_loaned loan{};
+  ASSERT_EQ(gimi_advertise(node_, "a", nullptr, &publisher), GIMI_OK);
+  gimi_handle subscription = 0;  // without one nothing is sent
+  ASSERT_EQ(gimi_subscribe(node_, "robot/a", nullptr, &subscription), GIMI_OK);
+  ASSERT_EQ(gimi_wait_for_subscribers(publisher, 1, 20'000), GIMI_OK);
+  ASSERT_EQ(gimi_sender(node_, gimi_id(node_), nullptr, &sender), GIMI_OK);
+  for (const std::size_t size : {GIMI_MESSAGE_BYTES_MAX + 1, std::size_t{1} << 45, SIZE_MAX}) {
+    EXPECT_EQ(gimi_publish(publisher, &byte, size, 1000, 0), GIMI_TOO_LARGE) << size;
+    EXPECT_EQ(gimi_loan(publisher, size, &loan), GIMI_TOO_LARGE) << size;
+    EXPECT_EQ(gimi_send(sender, &byte, size, 1000, 0), GIMI_TOO_LARGE) << size;
+  }
+  for (const gimi_handle each : {sender, subscription, publisher})
+    EXPECT_EQ(gimi_close(each), GIMI_OK);
+}
+
+TEST_F(GimiOptions, ARequestThatIsTooLargeIsNotAnOpenOne) {
+  constexpr int kOpenMax = 1024;
+  gimi_handle answers = 0;
+  gimi_reply reply{};
+  ASSERT_EQ(gimi_answer(node_, "add", nullptr, &answers), GIMI_OK);
+  for (int i = 0; i <= kOpenMax; ++i) {
+    const gimi_bytes data{"x", i % 2 == 0 ? SIZE_MAX : std::size_t{1} << 45};
+    ASSERT_EQ(gimi_ask(node_, "robot/add", &data, nullptr, &reply), GIMI_TOO_LARGE) << i;
+    ASSERT_EQ(reply.ran, GIMI_RAN_NO);
+  }
+  gimi_handle pending = 0;
+  EXPECT_EQ(gimi_ask_later(node_, "robot/add", nullptr, nullptr, &pending), GIMI_OK)
+      << gimi_error_text();
+  EXPECT_EQ(gimi_close(pending), GIMI_OK);
+  EXPECT_EQ(gimi_close(answers), GIMI_OK);
+}
+
+TEST_F(GimiOptions, AFailedCallLeavesItsOutputEmpty) {
+  const auto garbage = [] {
+    gimi_list list{};
+    list.count = 7;
+    list.storage = &list;
+    return list;
+  };
+  gimi_list list = garbage();
+  EXPECT_EQ(gimi_hub(node_, 77, 0, 0, &list), GIMI_BAD_ARGUMENT);
+  EXPECT_EQ(list.storage, nullptr);
+  list = garbage();
+  EXPECT_EQ(gimi_trace(node_, 1, 0, 0, nullptr, &list), GIMI_BAD_ARGUMENT);
+  EXPECT_EQ(list.storage, nullptr);
+  gimi_list_release(&list);
+  const std::vector<std::function<gimi_status(gimi_handle*)>> calls = {
+      [&](gimi_handle* made) { return gimi_advertise(node_, nullptr, nullptr, made); },
+      [&](gimi_handle* made) { return gimi_subscribe(node_, nullptr, nullptr, made); },
+      [&](gimi_handle* made) { return gimi_accept(node_, nullptr, nullptr, made); },
+      [&](gimi_handle* made) { return gimi_answer(node_, nullptr, nullptr, made); },
+      [&](gimi_handle* made) { return gimi_sender_to_service(node_, nullptr, nullptr, 0, made); },
+  };
+  for (const auto& call : calls) {
+    gimi_handle made = 77;
+    EXPECT_EQ(call(&made), GIMI_BAD_ARGUMENT);
+    EXPECT_EQ(made, 0u);
+  }
+  gimi_peer peer = 77;
+  EXPECT_EQ(gimi_find(node_, nullptr, 0, &peer), GIMI_BAD_ARGUMENT);
+  EXPECT_EQ(peer, 0u);
+  std::size_t count = 77;
+  EXPECT_EQ(gimi_wait_set_wait(0, nullptr, 1, sizeof(gimi_ready), 0, &count), GIMI_BAD_ARGUMENT);
+  EXPECT_EQ(count, 0u);
+}
+
+TEST_F(GimiOptions, SizesWithoutDataAndRecordsOfNoSizeAreRefused) {
+  std::int64_t round_trip_ns = 77;
+  const gimi_bytes echo{nullptr, 100};
+  EXPECT_EQ(gimi_ping(node_, gimi_id(node_), 0, &echo, 100, &round_trip_ns), GIMI_BAD_ARGUMENT);
+  gimi_list list{};
+  gimi_node_record record{};
+  ASSERT_EQ(gimi_nodes(node_, nullptr, 20'000, &list), GIMI_OK);
+  EXPECT_EQ(gimi_list_get(&list, 0, &record, SIZE_MAX), GIMI_BAD_ARGUMENT);
+  EXPECT_EQ(gimi_list_get(&list, 0, &record, 4097), GIMI_BAD_ARGUMENT);
+  gimi_list_release(&list);
+}
+
 TEST_F(GimiOptions, AnIdIsFoundByALiveNodeOnly) {
   gimi_peer peer = 0;
   EXPECT_EQ(gimi_find(0, "7.17", 0, &peer), GIMI_CLOSED);

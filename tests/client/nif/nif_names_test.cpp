@@ -324,5 +324,22 @@ TEST(NifNames, NoServiceHasTheGroupZero) {
   EXPECT_EQ(nif_withdraw(connected.node.get(), 0, 0), NIF_BAD_ARGUMENT);
 }
 
+TEST(NifNames, AFailedCallLeavesItsOutputEmpty) {
+  const auto garbage = [](auto* any) { return reinterpret_cast<decltype(any)>(std::uintptr_t{8}); };
+  FakeHub hub;
+  Connected connected = connect_to(hub, default_options(), make_welcome());
+  for (nif_node* const node : {connected.node.get(), static_cast<nif_node*>(nullptr)}) {
+    auto* reply = garbage(static_cast<nif_reply*>(nullptr));
+    EXPECT_NE(nif_request(node, NIF_NS, 1, nullptr, 5, &reply, 0), NIF_OK);
+    EXPECT_EQ(reply, nullptr);
+    auto* nodes = garbage(static_cast<nif_node_list*>(nullptr));
+    EXPECT_NE(nif_list_nodes(node, "a//b", &nodes, 0), NIF_OK);
+    EXPECT_EQ(nodes, nullptr);
+    auto* services = garbage(static_cast<nif_service_list*>(nullptr));
+    EXPECT_NE(nif_list_services(node, "a//b", &services, 0), NIF_OK);
+    EXPECT_EQ(services, nullptr);
+  }
+}
+
 }  // namespace
 }  // namespace gimnet::nif::test
