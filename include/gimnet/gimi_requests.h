@@ -109,7 +109,8 @@ typedef struct gimi_request {
 GIMNET_API gimi_status gimi_next_request(gimi_handle answers, int32_t timeout_ms,
                                          gimi_request* request);
 /** Answers a request with 0 bytes to 1 GiB. GIMI_CLOSED: it was answered already, or the service
- * has ended; and the errors of sending. */
+ * has ended; and the errors of sending, after which the request is still open: it can be answered
+ * again, also by gimi_fail_request(). */
 GIMNET_API gimi_status gimi_reply_to(gimi_request* request, const void* data, size_t size,
                                      int32_t timeout_ms);
 /** Answers a request with an error, for which `code` and `sentence` (at most 1,024 bytes; NULL:

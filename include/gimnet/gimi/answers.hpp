@@ -42,7 +42,8 @@ class Request {
   /// When it was taken: so long somebody waits for the answer; negative: no limit.
   [[nodiscard]] Timeout left() const { return Timeout{request_.left_ms}; }
 
-  /// Errors: closed (it was answered already, or the service has ended), and those of sending.
+  /// Errors: closed (it was answered already, or the service has ended), and those of sending,
+  /// after which the request is still open: it can be answered again, also by fail().
   Outcome<void> reply(BytesView data, Timeout timeout = kForever) {
     return detail::outcome_of(
         gimi_reply_to(&request_, data.data(), data.size(), milliseconds_of(timeout)));

@@ -42,8 +42,8 @@ void AnswerQueue::drop_late() {
       ++each;
       continue;
     }
-    const auto way = open_.extract(each->name);
-    if (!way.empty()) refuse(way.mapped(), each->name, RequestFault::late);
+    const auto open = open_.extract(each->name);
+    if (!open.empty()) refuse(open.mapped().way, each->name, RequestFault::late);
     waiting_bytes_ -= each->message.size();
     each = waiting_.erase(each);
   }
@@ -71,17 +71,34 @@ Outcome<void> AnswerQueue::answer(std::uint64_t name, MessageOperation operation
   {
     const MutexLock lock(mutex_);
     const auto open = open_.find(name);
-    if (open == open_.end()) {
+    if (open == open_.end() || open->second.is_being_answered) {
       return Failure{Status::closed, "cannot answer the request to " + service_ +
                                          ": it was answered already, or its service has ended"};
     }
-    way = open->second;
-    open_.erase(open);
-    keep({name, operation, {data.span().begin(), data.span().end()}});
+    open->second.is_being_answered = true;
+    open->second.came_again = false;
+    way = open->second.way;
   }
   const nif_status status = send(way, name, operation, data, nif_timeout(timeout));
-  if (status == NIF_OK) return {};
-  return failure_of(status, "answer the request to " + service_);
+  Outcome<void> outcome;
+  if (status != NIF_OK) outcome = failure_of(status, "answer the request to " + service_);
+  const MutexLock lock(mutex_);
+  const auto found = open_.find(name);
+  if (found == open_.end()) return outcome;
+  Open& open = found->second;
+  open.is_being_answered = false;
+  // After a failure the program may try again, or answer with an error. A closed node sends
+  // nothing any more.
+  if (status != NIF_OK && status != NIF_CLOSED) return outcome;
+  if (open.came_again) static_cast<void>(send(open.way, name, operation, data, 0));
+  close(name, operation, data);
+  return outcome;
+}
+
+void AnswerQueue::close(std::uint64_t name, MessageOperation operation, BytesView data) {
+  open_.erase(name);
+  if (data.size() <= kAnswerBytesMax)
+    keep({name, operation, {data.span().begin(), data.span().end()}});
 }
 
 Outcome<void> AnswerQueue::reply(std::uint64_t name, BytesView data, Timeout timeout) {
@@ -93,8 +110,16 @@ Outcome<void> AnswerQueue::fail(std::uint64_t name, const proto::gimi::RequestEr
   return answer(name, MessageOperation::error, data, Timeout{kLeaveTimeoutMs});
 }
 
+void AnswerQueue::let_go(std::uint64_t name) {
+  const proto::gimi::RequestError error{RequestFault::let_go, 0, ""};
+  if (fail(name, error)) return;
+  const MutexLock lock(mutex_);
+  // If the error found no way, the asking program gets it when it asks again.
+  if (open_.contains(name))
+    close(name, MessageOperation::error, proto::gimi::encode_request_error(error));
+}
+
 void AnswerQueue::keep(Answer answer) {
-  if (answer.data.size() > kAnswerBytesMax) return;
   answer_bytes_ += answer.data.size();
   answers_.push_back(std::move(answer));
   while (answers_.size() > kAnswersMax || answer_bytes_ > kAnswerBytesMax) {
@@ -124,7 +149,8 @@ bool AnswerQueue::on_request(const proto::gimi::MessageHeader& header, Message& 
   const bool known = came_.contains(name);
   if (known) {
     if (const auto open = open_.find(name); open != open_.end()) {
-      open->second = way;  // the asking node may have another id now
+      open->second.way = way;  // the asking node may have another id now
+      open->second.came_again = true;
       return false;
     }
     const auto kept = std::ranges::find(answers_, name, &Answer::name);
@@ -145,7 +171,7 @@ bool AnswerQueue::on_request(const proto::gimi::MessageHeader& header, Message& 
     return false;
   }
   remember(name);
-  open_.insert_or_assign(name, way);
+  open_.insert_or_assign(name, Open{way});
   const bool limited = left_ms != proto::gimi::kNoDeadline;
   const std::int64_t deadline =
       limited ? steady_now_ns() + std::int64_t{left_ms} * 1'000'000 : INT64_MAX;
@@ -160,8 +186,8 @@ void AnswerQueue::end(const Ending& ending) {
   const MutexLock lock(mutex_);
   end_ = ending;
   for (const Waiting& waiting : waiting_) {
-    const auto way = open_.extract(waiting.name);
-    if (!way.empty()) refuse(way.mapped(), waiting.name, RequestFault::withdrawn);
+    const auto open = open_.extract(waiting.name);
+    if (!open.empty()) refuse(open.mapped().way, waiting.name, RequestFault::withdrawn);
   }
   waiting_.clear();
   waiting_bytes_ = 0;

@@ -50,11 +50,13 @@ class AnswerQueue {
   /// A WaitSet waits for a request here, which may be too late when it is taken.
   void visit(const SourceVisitor& visitor) GIMNET_EXCLUDES(mutex_);
   /// Answers a request that was taken: once. Errors: closed (it has been answered, or the node
-  /// was closed), and those of sending.
+  /// was closed), and those of sending, after which it can be answered again.
   [[nodiscard]] Outcome<void> reply(std::uint64_t name, BytesView data, Timeout timeout)
       GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] Outcome<void> fail(std::uint64_t name, const proto::gimi::RequestError& error)
       GIMNET_EXCLUDES(mutex_);
+  /// The program has done with it: if it did not answer, the asking program is told so.
+  void let_go(std::uint64_t name) GIMNET_EXCLUDES(mutex_);
 
   /// True: it keeps the message, with its storage. `left_ms`: as the request says.
   [[nodiscard]] bool on_request(const proto::gimi::MessageHeader& header, Message& message,
@@ -74,6 +76,11 @@ class AnswerQueue {
     Lane lane = Lane::normal;
     MessageKey key;
   };
+  struct Open {
+    Way way;
+    bool is_being_answered = false;
+    bool came_again = false;  ///< since its answer was given away
+  };
   struct Answer {
     std::uint64_t name = 0;
     proto::gimi::MessageOperation operation{};
@@ -90,6 +97,9 @@ class AnswerQueue {
   }
   /// Nobody waits for these any more.
   void drop_late() GIMNET_REQUIRES(mutex_);
+  /// It was answered so.
+  void close(std::uint64_t name, proto::gimi::MessageOperation operation, BytesView data)
+      GIMNET_REQUIRES(mutex_);
   void keep(Answer answer) GIMNET_REQUIRES(mutex_);
   void remember(std::uint64_t name) GIMNET_REQUIRES(mutex_);
 
@@ -102,7 +112,7 @@ class AnswerQueue {
   WaitSource source_ GIMNET_GUARDED_BY(mutex_);
   std::deque<Waiting> waiting_ GIMNET_GUARDED_BY(mutex_);  ///< Limit: kWaitingMax, bytes_max_
   std::size_t waiting_bytes_ GIMNET_GUARDED_BY(mutex_) = 0;
-  std::map<std::uint64_t, Way> open_ GIMNET_GUARDED_BY(mutex_);       ///< not answered
+  std::map<std::uint64_t, Open> open_ GIMNET_GUARDED_BY(mutex_);      ///< not answered
   std::deque<std::uint64_t> names_ GIMNET_GUARDED_BY(mutex_);         ///< Limit: kNamesMax
   std::unordered_set<std::uint64_t> came_ GIMNET_GUARDED_BY(mutex_);  ///< the same
   std::deque<Answer> answers_ GIMNET_GUARDED_BY(mutex_);              ///< Limit: kAnswersMax

@@ -259,10 +259,8 @@ void gimi_request_release(gimi_request* request) {
   const std::unique_ptr<RequestStorage> storage(static_cast<RequestStorage*>(request->storage));
   *request = {};
   if (storage == nullptr || storage->core->home().left()) return;
-  // An error if it was answered: then there is nothing to say.
   static_cast<void>(guarded([&]() -> gimi_status {
-    static_cast<void>(
-        storage->queue->fail(storage->taken.name, {proto::gimi::RequestFault::let_go, 0, ""}));
+    storage->queue->let_go(storage->taken.name);
     return GIMI_OK;
   }));
 }

@@ -2,11 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <optional>
 #include <string>
+#include <thread>
 
 #include "tests/client/gimi/support/made_message.hpp"
+#include "tests/client/nif/support/fake_hub.hpp"
 
-// The queue alone: the uplink was never opened, so what it sends goes nowhere.
+// The queue alone: mostly the uplink was never opened, so what it sends goes nowhere.
 
 namespace gimnet::gimi {
 namespace {
@@ -128,6 +131,88 @@ TEST_F(AnswerQueueTest, NothingIsTakenAfterItsEnd) {
   queue_.end(Ending::closed());
   EXPECT_TRUE(queue_.receive(kNoWait).is(Status::closed));
   EXPECT_FALSE(ask(2));
+}
+
+/// A request was taken, and the hub has paused the way to who asked.
+class AnswersOnAFullWay : public testing::Test {
+ protected:
+  AnswersOnAFullWay() {
+    uplink_.open(connected_.node.get());
+    EXPECT_TRUE(ask());
+    taken_ = queue_.receive(kNoWait).or_throw().name;
+    connected_.hub.send(proto::flow::Pause{way()});
+    connected_.hub.send(proto::flow::Ping{77, 1});
+    while (const auto pong = connected_.hub.next_flow<proto::flow::Pong>())
+      if (pong->sequence == 77) break;
+  }
+  ~AnswersOnAFullWay() override { connected_.hub.close(); }
+  bool ask(std::uint8_t flags = 0) {
+    Message message = gimnet::test::make_message("x", 1);
+    from_ = message.from().id;
+    return queue_.on_request({1, MessageOperation::request, flags, 0, 7}, message, kNoDeadline);
+  }
+  [[nodiscard]] proto::flow::Target way() const {
+    return {proto::Kind::unicast, proto::Lane::bulk, from_};
+  }
+  void resume() { connected_.hub.send(proto::flow::Resume{way()}); }
+  /// Of the next message.
+  proto::gimi::MessageView next() {
+    frame_ = connected_.hub.next_message();
+    return proto::gimi::parse_message(frame_->view().payload).value();
+  }
+
+  nif::test::FakeHub hub_;
+  nif::test::Connected connected_ =
+      nif::test::connect_to(hub_, nif::test::default_options(), nif::test::make_welcome());
+  Uplink uplink_;
+  AnswerQueue queue_{uplink_, "calc/add", 1000};
+  std::uint32_t from_ = 0;
+  std::uint64_t taken_ = 0;
+  std::optional<nif::test::Frame> frame_;
+};
+
+TEST_F(AnswersOnAFullWay, AReplyThatWasNotSentCanBeTriedAgain) {
+  EXPECT_TRUE(queue_.reply(taken_, "3", kNoWait).is(Status::timeout));
+  EXPECT_TRUE(queue_.reply(taken_, "3", Timeout{1}).is(Status::timeout));
+  EXPECT_FALSE(ask(kFlagAgain)) << "the program has it";
+  resume();
+  queue_.reply(taken_, "3", kForever).or_throw();
+  EXPECT_EQ(next().header.operation, MessageOperation::reply);
+  EXPECT_TRUE(queue_.reply(taken_, "3", kNoWait).is(Status::closed));
+}
+
+TEST_F(AnswersOnAFullWay, AnErrorCanTakeThePlaceOfAReplyThatWasNotSent) {
+  EXPECT_TRUE(queue_.reply(taken_, "3", kNoWait).is(Status::timeout));
+  resume();
+  EXPECT_TRUE(queue_.fail(taken_, {proto::gimi::RequestFault::failed, -7, "no numbers"}));
+  EXPECT_EQ(next().header.operation, MessageOperation::error);
+}
+
+TEST_F(AnswersOnAFullWay, OneThatIsLetGoIsAnsweredWhenItIsAskedAgain) {
+  EXPECT_TRUE(queue_.reply(taken_, "3", kNoWait).is(Status::timeout));
+  queue_.let_go(taken_);
+  EXPECT_TRUE(queue_.reply(taken_, "3", kNoWait).is(Status::closed));
+  resume();
+  connected_.hub.send(proto::flow::Ping{78, 1});
+  while (const auto pong = connected_.hub.next_flow<proto::flow::Pong>())
+    if (pong->sequence == 78) break;
+  EXPECT_FALSE(ask(kFlagAgain));
+  EXPECT_EQ(next().header.operation, MessageOperation::error);
+}
+
+TEST_F(AnswersOnAFullWay, OneThatIsAskedAgainMeanwhileIsAnsweredTwice) {
+  std::thread answering([this] {
+    while (!queue_.reply(taken_, "3", kForever)) {
+    }
+  });
+  // The queue says so only while the other thread waits to send its answer.
+  while (!queue_.reply(taken_, "3", kNoWait).is(Status::closed)) {
+  }
+  EXPECT_FALSE(ask(kFlagAgain));
+  resume();
+  EXPECT_EQ(next().header.operation, MessageOperation::reply);
+  EXPECT_EQ(next().header.operation, MessageOperation::reply) << "the first may be lost";
+  answering.join();
 }
 
 TEST(AnswerTable, FindsAServiceByItsKey) {
