@@ -8,7 +8,7 @@ no lists of texts: these are refused with a sentence that names the key.
 from __future__ import annotations
 
 import struct
-from typing import Any, Dict, List, Mapping, Tuple, Union
+from typing import Any, Dict, List, Mapping, Tuple, Type, Union
 
 __all__ = ["BitestreamError", "Time", "decode", "encode"]
 
@@ -105,6 +105,8 @@ def _value(value: Value, where: str, depth: int) -> Tuple[int, bytes]:
         return _NESTED, bytes(nested)
     if isinstance(value, (list, tuple)):
         return _array(value, where)
+    if _is_scalar(value):
+        return _value(value.item(), where, depth)
     raise BitestreamError(f"{where} is a {type(value).__name__}: a Bitestream has bool, int, float, str, bytes, "
                           "Time, dict, and lists of numbers, bools or Times")
 
@@ -116,8 +118,24 @@ def _integer(value: int, kind: int, where: str) -> bytes:
         raise BitestreamError(f"{where} is {int(value)}: a Bitestream has whole numbers from -2**63 to 2**64 - 1") from None
 
 
+def _is_scalar(value: Any) -> bool:
+    """A number or bool of numpy, which has one of Python as its item(). A long double has none."""
+    return bool(getattr(value, "shape", None) == ()) and hasattr(value, "item") and type(value.item()) in (bool, int, float)
+
+
+def _kind(value: Any) -> Type[Any]:
+    """The type of Python that a value in a list counts as."""
+    for kind in (bool, Time, int, float):
+        if isinstance(value, kind):
+            return kind
+    return type(value)
+
+
 def _array(values: Union[List[Value], Tuple[Value, ...]], where: str) -> Tuple[int, bytes]:
     kinds = {type(value) for value in values}
+    if not kinds <= {bool, Time, int, float}:  # enums, numbers of numpy
+        values = [value.item() if _is_scalar(value) else value for value in values]
+        kinds = {_kind(value) for value in values}
     if kinds <= {bool}:
         kind = _BOOL
     elif kinds <= {Time}:

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Dictionaries as Bitestreams: the vectors of the protocol, what cannot be said, and hostile bytes."""
 
+import enum
 import math
 import pathlib
 import random
@@ -15,6 +16,18 @@ VECTORS = pathlib.Path(__file__).resolve().parents[1] / "vectors" / "bitestream"
 def vector(name):
     lines = (VECTORS / f"{name}.hex").read_text(encoding="utf-8").splitlines()
     return bytes.fromhex("".join(line.split("#")[0] for line in lines))
+
+
+class NumpyScalar:
+    """Looks as a number of numpy does, which need not be installed."""
+
+    shape = ()
+
+    def __init__(self, value):
+        self._value = value
+
+    def item(self):
+        return self._value
 
 
 class Bitestream(unittest.TestCase):
@@ -46,6 +59,17 @@ class Bitestream(unittest.TestCase):
                 self.assertIs(type(got["key"]), type(value))
         self.assertEqual(decode(encode({"a": [1, 0.5], "b": (1, 2), "c": bytearray(b"x")})), {"a": [1.0, 0.5], "b": [1, 2], "c": b"x"})
         self.assertTrue(math.isnan(decode(encode({"a": math.nan}))["a"]))
+
+    def test_takes_enums_and_numbers_of_numpy(self):
+        gear = enum.IntEnum("gear", "first second")
+        for value, meant in ((gear.second, 2), ([gear.first, gear.second, 5], [1, 2, 5]), ([NumpyScalar(0.5), 1], [0.5, 1.0]),
+                             (NumpyScalar(0.5), 0.5), (NumpyScalar(7), 7), ([NumpyScalar(True), False], [True, False])):
+            with self.subTest(str(value)):
+                self.assertEqual(encode({"key": value}), encode({"key": meant}))
+        with self.assertRaisesRegex(BitestreamError, "is a NumpyScalar"):
+            encode({"key": NumpyScalar(1j)})
+        with self.assertRaisesRegex(BitestreamError, "list of bool, int"):
+            encode({"key": [gear.first, True]})
 
     def test_nests_16_deep_and_no_deeper(self):
         self.assertEqual(encode(decode(vector("nested_16_deep")))[:4], vector("nested_16_deep")[:4])
