@@ -10,7 +10,7 @@ import select
 import threading
 import time
 import weakref
-from typing import Any, Callable, Generic, Iterator, Optional, Tuple, Type, TypeVar
+from typing import Any, Callable, Generic, Iterator, NoReturn, Optional, SupportsIndex, Tuple, Type, TypeVar
 
 from . import _c, errors
 
@@ -72,7 +72,10 @@ def to_text(text: str) -> bytes:
         raise TypeError(f"{text!r} is a {type(text).__name__}, and a str is needed here")
     if "\0" in text:
         raise errors.BadArgument(f"{text!r} has a zero byte")
-    return text.encode()
+    try:
+        return text.encode()
+    except UnicodeEncodeError as error:
+        raise errors.BadArgument(f"{text!r} is not Unicode text: {error}") from None
 
 
 def sized(made: Type[Raw], **members: Any) -> Raw:
@@ -99,7 +102,25 @@ def to_key(key: Tuple[int, int]) -> _c.gimi_key:
     return raw
 
 
-class Handle:
+class NotCopied:
+    """What ends with its last object, which a copy would end too early."""
+
+    def __reduce_ex__(self, _: SupportsIndex) -> NoReturn:
+        """For the modules copy and pickle."""
+        raise TypeError(f"a {type(self).__name__} cannot be copied, or be sent to another process: make one there")
+
+
+class Process:
+    """After each fork the child is another process."""
+
+    forks = 0
+
+    @classmethod
+    def begin_anew(cls) -> None:
+        cls.forks += 1
+
+
+class Handle(NotCopied):
     """Ends with close(), or with its node. One that is not `kept` also ends when nobody has it any more.
     Safe in every thread."""
 
@@ -108,6 +129,7 @@ class Handle:
     def __init__(self, handle: int, kept: bool = False) -> None:
         self._handle = handle
         self._kept = kept
+        self._forks = Process.forks
 
     def close(self) -> None:
         """Ends it; does nothing the second time. Calls that wait in it raise Closed."""
@@ -118,6 +140,15 @@ class Handle:
     def __del__(self) -> None:
         if not self._kept:
             self.close()
+
+    def is_here(self) -> bool:
+        """It belongs to this process, and not to its parent."""
+        return self._forks == Process.forks
+
+    def check_process(self) -> None:
+        """For calls that ask the library nothing, or get no status from it."""
+        if self._forks != Process.forks:
+            raise errors.Forked(f"this {type(self).__name__} belongs to the parent process: connect anew in the child")
 
     def check(self, status: int) -> None:
         """A thread that waits while the program ends goes without a word."""
@@ -138,6 +169,7 @@ class Joining:
         cls.lock = threading.Lock()
 
 
+os.register_at_fork(after_in_child=Process.begin_anew)
 os.register_at_fork(after_in_child=Joining.begin_anew)  # another thread may have held it
 
 
@@ -216,6 +248,7 @@ class Waitable(Handle):
     def fileno(self) -> int:
         """A descriptor that is readable while receive(0) gives something, for select, poll and asyncio. Read
         nothing from it, and do not close it. Taken: it is in a WaitSet, which has a fileno() itself."""
+        self.check_process()
         own = self.own_set()
         if own is None:
             raise errors.Taken("it is in a wait set already: use the fileno() of that")

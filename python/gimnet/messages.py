@@ -147,7 +147,10 @@ def payload(value: Any) -> Tuple[Any, int, Any]:
     if isinstance(value, Mapping):
         value = bitestream.encode(value)
     elif isinstance(value, str):
-        value = value.encode()
+        try:
+            value = value.encode()
+        except UnicodeEncodeError as error:
+            raise errors.BadArgument(f"the message is not Unicode text: {error}") from None
     if isinstance(value, bytes):
         return value, len(value), value
     try:

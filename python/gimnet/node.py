@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import collections
 import ctypes
-import threading
 from dataclasses import dataclass
 from typing import Any, Deque, Dict, Iterator, List, Optional, Tuple, Type, Union
 
@@ -14,6 +13,13 @@ from .messages import Event, Message, NodeRecord, Peer, ServiceRecord
 from .requests import Answers, Pending, Reply
 
 __all__ = ["ConnectionEvent", "ConnectionWatch", "Node", "Publisher", "Source", "State", "Watch", "connect"]
+
+
+def _peer(to: Peer) -> int:
+    if not 0 <= to < 1 << 32:
+        raise errors.BadArgument(f"{int(to)} is no node: a Peer is a number from 0 to 2**32 - 1")
+    return to
+
 
 class Source(Stream[Message]):
     """The messages of a subscription, or of an accepted service. A message counts as taken when
@@ -30,6 +36,7 @@ class Source(Stream[Message]):
         except IndexError:
             pass
         else:
+            self.check_process()  # the parent gives the messages that it fetched
             if self.shared and not self._ready and self._set is not None:
                 self._set.unwake()
             return message
@@ -41,7 +48,7 @@ class Source(Stream[Message]):
         return first
 
     def has_ready(self) -> bool:
-        return bool(self._ready)
+        return bool(self._ready) and self.is_here()
 
     @property
     def missed(self) -> int:
@@ -124,15 +131,21 @@ class Publisher(Waitable):
     @property
     def unsent(self) -> int:
         """Messages that were dropped, since the hub was away."""
+        self.check_process()
         return int(_c.lib.gimi_unsent(self._handle))
 
     @property
     def subscribers(self) -> int:
         """Their number, as the hub told last. With 0 nothing is sent."""
+        self.check_process()
         return int(_c.lib.gimi_subscribers(self._handle))
 
     def wait_for_subscribers(self, count: int = 1, timeout: Optional[float] = None) -> None:
         """Timeout, Closed."""
+        if not isinstance(count, int):
+            raise TypeError(f"subscribers are counted by an int, and this is a {type(count).__name__}")
+        if not 0 <= count < 1 << 32:
+            raise errors.BadArgument(f"a number of {count} subscribers: use 0 to 2**32 - 1")
         # Its descriptor stays readable until subscribers_changed() took the number.
         status = in_pieces(timeout, lambda ms: _c.lib.gimi_wait_for_subscribers(self._handle, count, ms))
         if status == _c.GIMI_TIMEOUT:
@@ -170,7 +183,6 @@ class Node(Waitable):
     def __init__(self, handle: int) -> None:
         super().__init__(handle)
         self._senders: Dict[Tuple[Union[str, Peer], str], int] = {}
-        self._lock = threading.Lock()  # guards _senders
         Exit.add(handle, self)
 
     def __enter__(self) -> Node:
@@ -199,6 +211,7 @@ class Node(Waitable):
     @property
     def id(self) -> Peer:
         """By which others know this node; Peer(0) if it is closed."""
+        self.check_process()
         return Peer(_c.lib.gimi_id(self._handle))
 
     @property
@@ -251,13 +264,15 @@ class Node(Waitable):
         self.check(status)
 
     def _sender(self, to: Union[str, Peer], lane: str, timeout: float) -> int:
-        with self._lock:
-            if (to, lane) not in self._senders:
-                options = sized(_c.gimi_send_options, lane=messages.chosen("lane", messages.LANES, lane))
-                self._senders[to, lane] = (
-                    self._opened(_c.lib.gimi_sender, to, options) if isinstance(to, Peer) else
+        sender = self._senders.get((to, lane))
+        if sender is None:
+            options = sized(_c.gimi_send_options, lane=messages.chosen("lane", messages.LANES, lane))
+            made = (self._opened(_c.lib.gimi_sender, _peer(to), options) if isinstance(to, Peer) else
                     self._opened(_c.lib.gimi_sender_to_service, to_text(to), options, to_ms(timeout)))
-            return self._senders[to, lane]
+            sender = self._senders.setdefault((to, lane), made)
+            if sender != made:  # another thread was faster
+                _c.lib.gimi_close(made)
+        return sender
 
     def answer(self, name: str, *, metadata: str = "", timeout: float = 5.0) -> Answers:
         """Answers the questions that others ask `own name/name`, until close() or the end of the node."""

@@ -8,7 +8,7 @@ import time
 from typing import Any, Dict, Optional
 
 from . import _c, bitestream, errors, messages
-from .handles import PIECE_MS, Handle, Stream, Waitable, end_of, in_pieces, to_text
+from .handles import PIECE_MS, Handle, NotCopied, Stream, Waitable, end_of, in_pieces, to_text
 from .messages import Peer
 
 __all__ = ["Answers", "Pending", "Reply", "Request"]
@@ -80,7 +80,7 @@ class Pending(Waitable):
             _c.lib.gimi_reply_release(raw)
 
 
-class Request(_Content):
+class Request(_Content, NotCopied):
     """A question of another program. Answer it once; one that is let go is answered with an error."""
 
     def __init__(self, raw: _c.gimi_request) -> None:

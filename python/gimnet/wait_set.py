@@ -90,6 +90,7 @@ class WaitSet(Handle):
     def fileno(self) -> int:
         """A descriptor for select, poll and asyncio: readable while wait(0) gives something. Read nothing from it,
         and do not close it."""
+        self.check_process()
         raw = self._raw
         if raw is None:
             raise errors.Closed("the wait set was closed")

@@ -17,6 +17,16 @@ def program(lines, hub, *arguments):
                             text=True)
 
 
+class OneHub(unittest.TestCase):
+    def setUp(self):
+        self.hub = Hub(self)
+
+    def ends(self, process, code, noise="", patience=PATIENCE_S):
+        out, err = process.communicate(timeout=patience)
+        self.assertEqual((process.returncode, err), (code, noise), out)
+        return out
+
+
 class TwoNodes(unittest.TestCase):
     def setUp(self):
         self.hub = Hub(self)
