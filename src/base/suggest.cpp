@@ -44,12 +44,15 @@ std::string did_you_mean(std::string_view word, std::span<const std::string_view
   for (const std::string_view candidate : candidates) {
     if (candidate == word) continue;  // it came in the meantime: what was meant is what was said
     const std::size_t longer = std::max(word.size(), candidate.size());
-    if (longer - std::min(word.size(), candidate.size()) >= least)
+    if (longer - std::min(word.size(), candidate.size()) > least)
       continue;  // so many letters differ at least
     const std::size_t distance = distance_between(
         word, candidate, [](char one, char other) { return lower(one) == lower(other); });
     // Half of the letters must be right: of three letters two steps lead nearly anywhere.
-    if (distance < least && 2 * distance <= longer) {
+    if (distance > least || 2 * distance > longer) continue;
+    // Of two that are as near, the one that goes on where the word ends.
+    const bool goes_on = candidate.starts_with(word) && !best.starts_with(word);
+    if (distance < least || (!best.empty() && goes_on)) {
       least = distance;
       best = candidate;
     }

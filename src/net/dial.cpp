@@ -164,7 +164,8 @@ std::optional<NetError> await_welcome(Stream& stream, DialHandshake& handshake,
   };
   const Silences silences{
       closed_early(address),
-      {Fault::timeout, "the peer at " + address.url() + " does not answer HELLO; is it a hub?"}};
+      {Fault::timeout,
+       "the peer at " + address.url() + " does not answer HELLO; is it a hub, and not stopped?"}};
   if (auto error =
           read_answer(stream, handshake.missing(), take, address, silences, deadline, cancel))
     return error;

@@ -27,6 +27,11 @@ TEST(DidYouMean, NamesTheNearest) {
   EXPECT_EQ(did_you_mean("--shrads", kWords), "; did you mean --shards?");
 }
 
+TEST(DidYouMean, OfTwoAsNearNamesTheOneThatTheWordBegins) {
+  constexpr std::array<std::string_view, 4> kWords{"pub", "hubs", "hug", "sub"};
+  EXPECT_EQ(did_you_mean("hub", kWords), "; did you mean hubs?");
+}
+
 TEST(DidYouMean, CapitalsAreNoDifference) {
   constexpr std::array<std::string_view, 3> kWords{"hub_id", "hub_name", "Robot"};
   EXPECT_EQ(did_you_mean("HUB_ID", kWords), "; did you mean hub_id?");

@@ -306,7 +306,8 @@ void SimShards::finish_drain(std::size_t index) {
   for (const std::unique_ptr<Seat>& seat : shards_[index].seats) {
     if (seat == nullptr || !seat->wire) continue;
     flush(index, *seat);
-    close(index, *seat, GoodbyeCode::draining, "the hub is shutting down; dial again");
+    close(index, *seat, GoodbyeCode::draining,
+          "the hub ends, or begins anew under another hub id; dial again");
   }
   push_event(index, {ShardIndex{static_cast<std::uint8_t>(index)}, hub::DrainedEvent{}});
 }

@@ -277,7 +277,7 @@ class Strangers(Tool):
         listener = socket.create_server(("127.0.0.1", 0))
         self.addCleanup(listener.close)
         url = f"tcp://127.0.0.1:{listener.getsockname()[1]}"
-        self.expect(NO_CONNECTION, [f"the peer at {url} does not answer HELLO; is it a hub?"], ["--hub", url, "nodes"])
+        self.expect(NO_CONNECTION, [f"the peer at {url} does not answer HELLO; is it a hub, and not stopped?"], ["--hub", url, "nodes"])
 
     def test_another_version(self):
         body = bytes([3 << 3, 1, 0, 0, 2, 1, 0])

@@ -64,7 +64,7 @@ void Keeper::look_at(Connection& connection) {
                        !connection.confirm_due() && connection.transport->pending_out() == 0;
   if (draining_ && (state_.now_ms >= drain_deadline_ms_ || (written && state_.nothing_follows))) {
     return closer_.close(connection, proto::GoodbyeCode::draining,
-                         "the hub is shutting down; dial again");
+                         "the hub ends, or begins anew under another hub id; dial again");
   }
   if (connection.missed_resume) {
     return closer_.close(connection, proto::GoodbyeCode::too_many_requests,
