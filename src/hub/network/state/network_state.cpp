@@ -193,7 +193,7 @@ void NetworkState::advance(std::chrono::milliseconds now) {
     own_.set_neighbours(neighbours);
   }
   say_own(now);
-  if (map_changed_ && now >= map_pace_.next()) compute_map(now);
+  if (map_changed_ && now >= next_map_at_) compute_map(now);
   if (now >= forget_pace_.next()) {
     forget_pace_.note_done(now);
     store_.forget(now);
@@ -210,7 +210,7 @@ void NetworkState::say_own(std::chrono::milliseconds now) {
 
 void NetworkState::compute_map(std::chrono::milliseconds now) {
   map_changed_ = false;
-  map_pace_.note_done(now);
+  next_map_at_ = now + kMapPause * (1 + store_.bytes() / (1024 * 1024));
   map_ = NetworkMap(own_.identity(), store_, carrying_links());
   ++maps_;
   store_.set_reachable(map_.reachable(), now);
@@ -221,7 +221,7 @@ std::optional<std::chrono::milliseconds> NetworkState::next_due() const {
   const auto note = [&due](std::chrono::milliseconds time) {
     due = std::min(due.value_or(time), time);
   };
-  if (map_changed_) note(map_pace_.next());
+  if (map_changed_) note(next_map_at_);
   if (links_changed_) note(std::chrono::milliseconds::min());
   for (const auto& [number, link] : links_) {
     if (const auto waits = link.pace.next_due()) note(*waits);

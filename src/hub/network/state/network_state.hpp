@@ -1,7 +1,9 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <memory>
 #include <optional>
@@ -25,14 +27,14 @@ class PartPace {
 
   /// True: take it now. False: it waits, or a newer one does.
   [[nodiscard]] bool admit(const PartRef& part, std::chrono::milliseconds now) {
-    const auto [found, is_new] =
-        heard_.try_emplace({part->said.hub, part->said.part}, Heard{now + kPause, nullptr});
+    const Part key{part->said.hub, part->said.part};
+    const auto [found, is_new] = heard_.try_emplace(key);
     Heard& heard = found->second;
-    if (is_new) return true;
-    if (heard.waiting == nullptr && now >= heard.next) {
-      heard.next = now + kPause;
+    if (is_new || (heard.waiting == nullptr && now >= heard.next)) {
+      pause(key, heard, now);
       return true;
     }
+    if (heard.waiting == nullptr) ++waiting_;
     if (heard.waiting == nullptr || is_newer(part->said, heard.waiting->said)) heard.waiting = part;
     return false;
   }
@@ -40,35 +42,44 @@ class PartPace {
   /// The parts that waited long enough.
   [[nodiscard]] std::vector<PartRef> take_due(std::chrono::milliseconds now) {
     std::vector<PartRef> due;
-    for (auto entry = heard_.begin(); entry != heard_.end();) {
-      Heard& heard = entry->second;
-      if (now < heard.next) {
-        ++entry;
-      } else if (heard.waiting == nullptr) {
-        entry = heard_.erase(entry);
-      } else {
-        due.push_back(std::exchange(heard.waiting, nullptr));
-        heard.next = now + kPause;
-        ++entry;
+    while (!pauses_.empty() && pauses_.front().until <= now) {
+      const Pause over = pauses_.front();
+      pauses_.pop_front();
+      const auto entry = heard_.find(over.part);
+      if (entry == heard_.end() || entry->second.next != over.until) continue;  // a later one began
+      if (entry->second.waiting == nullptr) {
+        heard_.erase(entry);
+        continue;
       }
+      due.push_back(std::exchange(entry->second.waiting, nullptr));
+      --waiting_;
+      pause(over.part, entry->second, now);
     }
     return due;
   }
-  /// Nothing: no part waits.
+  /// When to look for them: no later than one is due. Nothing: no part waits.
   [[nodiscard]] std::optional<std::chrono::milliseconds> next_due() const {
-    std::optional<std::chrono::milliseconds> due;
-    for (const auto& [part, heard] : heard_) {
-      if (heard.waiting != nullptr) due = std::min(due.value_or(heard.next), heard.next);
-    }
-    return due;
+    return waiting_ == 0 ? std::nullopt : std::optional{pauses_.front().until};
   }
 
  private:
+  using Part = std::pair<proto::HubKey, std::uint16_t>;
   struct Heard {
-    std::chrono::milliseconds next;
+    std::chrono::milliseconds next{};
     PartRef waiting;
   };
-  std::map<std::pair<proto::HubKey, std::uint16_t>, Heard> heard_;
+  struct Pause {
+    std::chrono::milliseconds until{};
+    Part part;
+  };
+  void pause(const Part& part, Heard& heard, std::chrono::milliseconds now) {
+    heard.next = now + kPause;
+    pauses_.push_back({heard.next, part});
+  }
+
+  std::map<Part, Heard> heard_;
+  std::deque<Pause> pauses_;  ///< of all heard, in the order of time. Limit: 2 of each part
+  std::size_t waiting_ = 0;   ///< parts
 };
 
 /// The far end of a link, and how the link came about.
@@ -115,7 +126,8 @@ struct Sending {
 /// may have ended while they were under way. Limits: those of its parts.
 class NetworkState {
  public:
-  /// The next hops are computed at once, then at most so often.
+  /// The next hops are computed at once, then at most so often for each begun mebibyte of records:
+  /// computing takes a fraction of that pause, however many hubs are invented.
   static constexpr std::chrono::milliseconds kMapPause{50};
   /// Neighbours whose records differ for so long send them again: those of hubs that they can
   /// reach, which are the ones that they compare. The pauses double as long as it does not help.
@@ -203,7 +215,7 @@ class NetworkState {
   std::map<LinkNumber, Link> links_;
   bool links_changed_ = false;
   bool map_changed_ = false;
-  ChangePace map_pace_{{kMapPause, kMapPause}};
+  std::chrono::milliseconds next_map_at_ = std::chrono::milliseconds::min();
   ChangePace forget_pace_{{kForgetPause, kForgetPause}};
   ChangePace crowded_pace_{{kCrowdedPause, kCrowdedPause}};
   std::optional<LinkNumber> crowding_;

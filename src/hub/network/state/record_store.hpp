@@ -100,6 +100,8 @@ class RecordStore {
   void set_reachable(std::span<const proto::HubKey> hubs, std::chrono::milliseconds now);
   void forget(std::chrono::milliseconds now);
 
+  /// Of all records, with what it costs to keep each of them.
+  [[nodiscard]] std::size_t bytes() const { return bytes_; }
   /// Of all parts that count of all hubs that can be reached. Equal records give equal digests.
   [[nodiscard]] std::uint64_t digest() const;
   /// Parts that were not taken, and records that others took the place of.

@@ -43,5 +43,21 @@ TEST(PartPace, TakesNothingAheadOfAPartThatWaits) {
   EXPECT_EQ(pace.take_due(kNow + milliseconds(70)).front()->said.sequence, 4u);
 }
 
+TEST(PartPace, LooksOnlyAtPartsThatAreDue) {
+  PartPace pace;
+  const auto first = identity(1, 7);
+  const auto second = identity(2, 7);
+  EXPECT_TRUE(pace.admit(part(first, 1), kNow));
+  EXPECT_TRUE(pace.admit(part(second, 1), kNow + milliseconds(10)));
+  EXPECT_FALSE(pace.admit(part(second, 2), kNow + milliseconds(11)));
+  EXPECT_TRUE(pace.admit(part(first, 2), kNow + milliseconds(55))) << "its pause is over";
+  EXPECT_TRUE(pace.take_due(kNow + milliseconds(59)).empty());
+  EXPECT_EQ(pace.next_due(), kNow + milliseconds(60));
+  EXPECT_EQ(pace.take_due(kNow + milliseconds(60)).size(), 1u);
+  EXPECT_FALSE(pace.next_due());
+  EXPECT_FALSE(pace.admit(part(first, 3), kNow + milliseconds(104))) << "its second pause";
+  EXPECT_EQ(pace.take_due(kNow + milliseconds(105)).front()->said.sequence, 3u);
+}
+
 }  // namespace
 }  // namespace gimnet::hub

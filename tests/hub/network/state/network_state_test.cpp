@@ -237,6 +237,21 @@ TEST_F(HubWithTwoLinks, ComputesAtOnceAndThenEach50Ms) {
   EXPECT_EQ(hub_.map().next_hops()[3], LinkNumber{});
 }
 
+TEST_F(HubWithTwoLinks, ComputesMoreRarelyTheMoreRecordsThereAre) {
+  std::vector<std::pair<proto::HubKey, std::uint16_t>> neighbours;
+  for (std::uint16_t hub = 100; hub < 164; ++hub) neighbours.emplace_back(hub_key(hub), 10);
+  for (std::uint16_t hub = 1'000; hub < 1'800; ++hub)
+    hub_.take_record(kFirst, bytes(identity(hub, 7), 1, neighbours), later_);
+  hub_.advance(later_);
+  ASSERT_EQ(hub_.store().bytes() / (1024 * 1024), 1u);
+  hub_.end_link(kFirst);
+  hub_.advance(later_ + milliseconds(99));
+  EXPECT_EQ(hub_.map().next_hops()[2], kFirst);
+  EXPECT_EQ(hub_.next_due(), later_ + milliseconds(100));
+  hub_.advance(later_ + milliseconds(100));
+  EXPECT_EQ(hub_.map().next_hops()[2], LinkNumber{});
+}
+
 TEST_F(HubWithTwoLinks, CountsWhatIsNoRecord) {
   hub_.take_record(kFirst, proto::Payload(3), later_);
   EXPECT_EQ(hub_.malformed(), 1u);
