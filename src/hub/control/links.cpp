@@ -181,6 +181,7 @@ void Links::on_route(const SessionRef& session, std::uint32_t attachment,
   if (!link->exchange_begun) begin_exchange(*link, moment);
   const auto control = proto::split_control(payload);
   if (!control) return;
+  const std::uint64_t before = malformed();
   switch (static_cast<proto::route::RouteOperation>(control->header.operation)) {
     case proto::route::RouteOperation::record:
       network_.take_record(link->number(), {payload.begin(), payload.end()}, moment.now);
@@ -202,6 +203,8 @@ void Links::on_route(const SessionRef& session, std::uint32_t attachment,
       wiring_.names.take(link->number(), payload, moment.now);
       wiring_.groups.take(link->number(), payload);
   }
+  if (malformed() != before)
+    log_malformed({link->name(), link->title(), control->header.operation}, moment.now);
   advance(moment);
 }
 

@@ -86,6 +86,10 @@ class Links {
   [[nodiscard]] const NetworkState& network() const { return network_; }
   /// Of sessions of links that have ended.
   [[nodiscard]] const LinkTotals& totals() const { return totals_; }
+  /// Messages of other hubs that were not what they should be.
+  [[nodiscard]] std::uint64_t malformed() const {
+    return network_.malformed() + wiring_.names.malformed() + wiring_.groups.malformed();
+  }
   /// Says what is due, and publishes what follows from it.
   void advance(Moment moment);
 

@@ -44,4 +44,27 @@ void log_refused(NodeId link, const proto::FrameHeader& header) {
                "`gimnet status --json` counts both");
 }
 
+void log_malformed(const RouteMessage& message, std::chrono::milliseconds now) {
+  log_seldom(LogLevel::warning, {"malformed", message.link},
+             "link " + message.link + " to " + message.peer +
+                 ": sent a malformed message (ROUTE, operation " +
+                 std::to_string(message.operation) +
+                 "), which is ignored; links.malformed in `gimnet status` counts them",
+             now);
+}
+
+void log_seldom(LogLevel level, const LogSubject& subject, const std::string& text,
+                std::chrono::milliseconds now) {
+  thread_local LogThrottle throttle;
+  constexpr int kSeldomS = 10;
+  // The throttle counts lines a second: its second takes ten.
+  const LogThrottle::Verdict verdict =
+      throttle.take(subject.reason, subject.peer, 1, now / kSeldomS);
+  if (!verdict.write) return;
+  const std::string left_out = verdict.left_out == 0 ? ""
+                                                     : " (" + std::to_string(verdict.left_out) +
+                                                           " lines like this were left out)";
+  log_line(level, subject, text + left_out);
+}
+
 }  // namespace gimnet::hub

@@ -1,9 +1,12 @@
 #pragma once
 
+#include <chrono>
+#include <cstdint>
 #include <string>
 #include <string_view>
 
 #include "base/ids.hpp"
+#include "base/log.hpp"
 #include "hub/control/state/identity.hpp"
 #include "proto/frame/frame_header.hpp"
 
@@ -32,5 +35,20 @@ namespace gimnet::hub {
 
 /// Logs that a frame of the link to that hub was dropped.
 void log_refused(NodeId link, const proto::FrameHeader& header);
+
+/// A ROUTE message of a link.
+struct RouteMessage {
+  std::string link;  ///< its name
+  std::string peer;  ///< the hub at its other end: "hub 7 'lab'"
+  std::uint16_t operation = 0;
+};
+/// Logs, at most each 10 s for one link, that a message was not what it should be.
+void log_malformed(const RouteMessage& message, std::chrono::milliseconds now);
+
+/// Logs at most one line each 10 s about one subject; the next one tells how many were left out.
+/// For lines that a peer repeats as long as nobody changes its configuration. Thread safety: counts
+/// for each thread apart. `now`: monotonic.
+void log_seldom(LogLevel level, const LogSubject& subject, const std::string& text,
+                std::chrono::milliseconds now);
 
 }  // namespace gimnet::hub

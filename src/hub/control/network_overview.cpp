@@ -69,8 +69,7 @@ std::vector<LinkView> NetworkOverview::links() const {
 
 std::vector<NetworkView::Count> NetworkOverview::not_taken() const {
   const NameCopies* names = parts_.names.copies();
-  return {{"links.malformed", parts_.links.network().malformed() + parts_.names.malformed() +
-                                  parts_.groups.malformed()},
+  return {{"links.malformed", parts_.links.malformed()},
           {"links.joins_refused", parts_.groups.refused()},
           {"links.names_refused", names == nullptr ? 0 : names->refused()}};
 }

@@ -26,13 +26,19 @@ constexpr int kBatch = 64;
 /// this much that nobody looks at.
 constexpr std::size_t kDiscardedMax = 64 * 1'024;
 
+LogSubject subject_of(const PeerInfo& who, const Goodbye& goodbye) {
+  return {proto::goodbye_name(goodbye.code), log_peer(who.transport, who.address)};
+}
+
+std::string refusal_text(const PeerInfo& who, const Goodbye& goodbye) {
+  return "refused " + who.transport + " " + who.address + ": " + goodbye.sentence + " (" +
+         proto::goodbye_name(goodbye.code) + ")";
+}
+
 }  // namespace
 
 void log_refusal(const PeerInfo& who, const Goodbye& goodbye) {
-  log_line(LogLevel::info,
-           {proto::goodbye_name(goodbye.code), log_peer(who.transport, who.address)},
-           "refused " + who.transport + " " + who.address + ": " + goodbye.sentence + " (" +
-               proto::goodbye_name(goodbye.code) + ")");
+  log_line(LogLevel::info, subject_of(who, goodbye), refusal_text(who, goodbye));
 }
 
 WaitingRoom::WaitingRoom(const Limits& limits, Judge judge, RefusalCounters& refusals)
@@ -246,7 +252,13 @@ void WaitingRoom::discard(Peer& peer) {
 }
 
 void WaitingRoom::turn_away(Peer& peer, const Goodbye& goodbye, milliseconds now) {
-  log_refusal(peer.stranger.peer, goodbye);
+  // A hub dials again, after half a second at most, as long as nobody changes its configuration.
+  const PeerInfo& who = peer.stranger.peer;
+  if (peer.handshake->hello().role == proto::Role::hub) {
+    log_seldom(LogLevel::info, subject_of(who, goodbye), refusal_text(who, goodbye), now);
+  } else {
+    log_refusal(who, goodbye);
+  }
   if (peer.stranger.on_reserve && goodbye.code == GoodbyeCode::no_memory) {
     refusals_.no_descriptor.add(1);
   } else {

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <string>
+
 namespace gimnet::hub {
 namespace {
 
@@ -15,6 +18,21 @@ TEST(LogPeer, IsTheAddressWhereThereIsNothingToLeaveOut) {
   EXPECT_EQ(log_peer("tcp", "unknown"), "unknown");
   EXPECT_EQ(log_peer("unix", "unknown"), "unknown");
   EXPECT_EQ(log_peer("", ""), "");
+}
+
+TEST(LogSeldom, WritesALineEach10SecondsAndCountsTheOthers) {
+  using std::chrono::milliseconds;
+  const auto lines = [](int count, const char* peer, milliseconds now) {
+    testing::internal::CaptureStderr();
+    for (int i = 0; i < count; ++i) log_seldom(LogLevel::error, {"seldom", peer}, "again", now);
+    return testing::internal::GetCapturedStderr();
+  };
+  const auto count = [](const std::string& text) { return std::ranges::count(text, '\n'); };
+  EXPECT_EQ(count(lines(20, "10.0.0.1", milliseconds{1'000})), 1);
+  EXPECT_EQ(count(lines(1, "10.0.0.2", milliseconds{1'000})), 1);
+  EXPECT_EQ(count(lines(9, "10.0.0.1", milliseconds{10'990})), 0);
+  const std::string next = lines(1, "10.0.0.1", milliseconds{11'000});
+  EXPECT_NE(next.find("again (28 lines like this were left out)"), std::string::npos) << next;
 }
 
 TEST(RemoteAddress, IsThatOfAnotherMachine) {

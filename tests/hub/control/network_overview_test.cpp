@@ -74,7 +74,10 @@ TEST(NetworkOverview, CountsWhatCameOverLinksAndWasNotTaken) {
   proto::Payload join(proto::kControlHeaderSize);
   store_le(join.data(), proto::route::Join::kOperation);
   const AttachCommand& link = hubs.a.attached();
+  testing::internal::CaptureStderr();
   hubs.a.links.on_route(link.session, link.attachment, join, hubs.a.moment());
+  const std::string logged = testing::internal::GetCapturedStderr();
+  EXPECT_NE(logged.find("to hub 2 'hub-2': sent a malformed message"), std::string::npos) << logged;
   EXPECT_STREQ(at_a.not_taken()[0].name, "links.malformed");
   EXPECT_EQ(malformed(), 1u);
 }

@@ -53,6 +53,24 @@ TEST_F(WaitingRoomTest, WhoLeavesAndTalksInTheBatchOfARefusalIsServedOnce) {
   EXPECT_EQ(second.receive_goodbye(), (Goodbye{GoodbyeCode::name_taken, "taken"}));
 }
 
+TEST_F(WaitingRoomTest, AHubThatIsRefusedAgainAndAgainIsLoggedEach10Seconds) {
+  proto::Hello again = hello("unwelcome");
+  again.role = proto::Role::hub;
+  again.introduction.emplace();
+  again.introduction->hub.hub = HubId{9};
+  again.introduction->instance = proto::HubInstance{1};
+  const auto logged = [&](std::chrono::milliseconds now) {
+    testing::internal::CaptureStderr();
+    enter_from("10.0.0.77", now).send(opening_and(again));
+    serve(now);
+    return testing::internal::GetCapturedStderr();
+  };
+  EXPECT_NE(logged(20s).find("refused tcp 10.0.0.77:"), std::string::npos);
+  for (int i = 1; i < 20; ++i) EXPECT_EQ(logged(20s + i * 500ms), "");
+  EXPECT_NE(logged(30s).find("(19 lines like this were left out)"), std::string::npos);
+  EXPECT_EQ(refusals_.of(GoodbyeCode::name_taken), 21u);
+}
+
 TEST_F(WaitingRoomTest, WhoDoesNotCloseAfterGoodbyeIsClosed) {
   Peer& peer = enter();
   peer.send(opening_and(hello("unwelcome")));
