@@ -11,6 +11,7 @@
 #include "base/log.hpp"
 #include "hub/control/acceptor.hpp"
 #include "hub/control/event_turns.hpp"
+#include "hub/control/log_peer.hpp"
 #include "hub/control/waiting_room.hpp"
 
 namespace gimnet::hub {
@@ -128,6 +129,14 @@ struct ConductorLoop::Impl {
         turns.put(std::move(event));
       }
     });
+    if (const auto hub = turns.take_overrun()) {
+      const std::string name = std::to_string(hub->value());
+      log_seldom(LogLevel::warning, {"overrun", name},
+                 "link to hub " + name +
+                     ": says more to this hub than it can work off, and some of it is dropped; the "
+                     "link's data is not affected",
+                 now());
+    }
   }
 
   /// A stranger that has said HELLO does not make way for others.

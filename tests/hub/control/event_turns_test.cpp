@@ -22,6 +22,15 @@ class EventTurnsTest : public ::testing::Test {
   void end(char node, std::uint32_t number) {
     turns_.put({ShardIndex{0}, DetachedEvent{session(node), number, {}, false, {}, {}}});
   }
+  /// A frame of the link to hub 9.
+  void say(proto::Kind kind, std::uint32_t attachment, std::size_t size = proto::kHeaderSize) {
+    ControlFrameEvent event{session('l'), attachment, make_id<NodeId>(HubId{9}, kHubIndex), {}};
+    event.frame.resize(size);
+    proto::FrameHeader header;
+    header.kind = kind;
+    proto::store_header(event.frame.data(), header);
+    turns_.put({ShardIndex{0}, std::move(event)});
+  }
   static std::string name(const ShardEvent& event) {
     const auto text = [](const char* what, const auto& one) {
       return what + std::string(1, static_cast<char>(one.session.slot.value())) +
@@ -75,6 +84,31 @@ TEST_F(EventTurnsTest, WhoseConnectionEndedNeedsNoTurn) {
   end('a', 3);
   EXPECT_THAT(rest(), ElementsAre("end a3"));
   EXPECT_TRUE(turns_.take_ended().empty());
+}
+
+TEST_F(EventTurnsTest, RouteFramesOfALinkGoWithItsConnection) {
+  for (int i = 0; i < 10; ++i) say(proto::Kind::route, 1);
+  say(proto::Kind::ns, 1);
+  end('l', 1);
+  say(proto::Kind::route, 2);
+  EXPECT_THAT(rest(), ElementsAre("l1", "end l1", "l2"));
+}
+
+TEST_F(EventTurnsTest, ALinkThatSaysTooMuchLosesFramesAndKeepsItsEnd) {
+  constexpr std::size_t kSize = 65'536;
+  constexpr std::uint32_t kRoom = EventTurns::kLinkBytesMax / (kSize + 256);
+  for (std::uint32_t i = 1; i <= kRoom; ++i) say(proto::Kind::route, i, kSize);
+  EXPECT_FALSE(turns_.take_overrun());
+  for (int i = 0; i < 1'000; ++i) say(proto::Kind::ns, 999, kSize);
+  EXPECT_EQ(turns_.take_overrun(), HubId{9});
+  EXPECT_FALSE(turns_.take_overrun());
+  EXPECT_EQ(name(turns_.take()), "l1");
+  say(proto::Kind::ns, 1'000, kSize);
+  EXPECT_FALSE(turns_.take_overrun()) << "one was worked off";
+  end('l', 1'001);
+  EXPECT_THAT(rest(), ElementsAre("l1000", "end l1001"));
+  for (std::uint32_t i = 1; i <= kRoom; ++i) say(proto::Kind::ns, i, kSize);
+  EXPECT_FALSE(turns_.take_overrun()) << "all was worked off";
 }
 
 TEST_F(EventTurnsTest, TheEndOfAShardComesLast) {
