@@ -349,16 +349,6 @@ void Links::send(const HubLink& link, proto::Kind kind, std::span<const std::byt
                                          control_frame(kind, NodeId{}, wiring_.facts.id, payload)});
 }
 
-HubLink* Links::find(LinkNumber number) {
-  const auto found = links_.find(number);
-  return found == links_.end() ? nullptr : found->second.get();
-}
-
-HubLink* Links::find(const SessionRef& session) {
-  const auto found = by_generation_.find(session.generation);
-  return found == by_generation_.end() ? nullptr : find(found->second);
-}
-
 std::string Links::add(const DialledLink& link) {
   if (const HubLink* known = find(link.name); known != nullptr && known->is_dialled())
     return "there is a link '" + link.name + "' already; give another name";

@@ -128,8 +128,14 @@ class Links {
   void leave_network(Verdict verdict, Moment moment);
   void publish_routes();
   void send(const HubLink& link, proto::Kind kind, std::span<const std::byte> payload);
-  [[nodiscard]] HubLink* find(LinkNumber number);
-  [[nodiscard]] HubLink* find(const SessionRef& session);
+  [[nodiscard]] HubLink* find(LinkNumber number) {
+    const auto found = links_.find(number);
+    return found == links_.end() ? nullptr : found->second.get();
+  }
+  [[nodiscard]] HubLink* find(const SessionRef& session) {
+    const auto found = by_generation_.find(session.generation);
+    return found == by_generation_.end() ? nullptr : find(found->second);
+  }
   [[nodiscard]] HubLink* find(std::string_view name);
 
   const LinksOptions options_;

@@ -141,7 +141,11 @@ void NetworkState::set_damped(LinkNumber number, bool damped) {
 }
 
 void NetworkState::end_link(LinkNumber number) {
-  if (links_.erase(number) != 0) note_links();
+  if (links_.erase(number) == 0) return;
+  note_links();
+  // Before the pause is over: frames under way go by another link, if there is one.
+  map_ = NetworkMap(own_.identity(), store_, carrying_links());
+  ++maps_;
 }
 
 void NetworkState::note_links() {

@@ -155,6 +155,7 @@ class NetworkState {
   void set_cost(LinkNumber number, std::uint16_t cost);
   /// A damped link carries records and is not reported.
   void set_damped(LinkNumber number, bool damped);
+  /// The map goes without it at once.
   void end_link(LinkNumber number);
   /// All records of the other side have come.
   [[nodiscard]] bool is_up(LinkNumber number) const {

@@ -128,6 +128,16 @@ TEST_F(HubWithTwoLinks, WithdrawsALinkAtOnce) {
   EXPECT_EQ(sent(hub_), Sent{}) << "the link is unknown";
 }
 
+TEST_F(HubWithTwoLinks, HasNoMomentWithoutARouteWhereAParallelLinkStands) {
+  constexpr LinkNumber kParallel{3};
+  hub_.begin_connection(kParallel, to(two_, 20), later_);
+  hub_.take_mark(kParallel);
+  hub_.advance(later_);
+  ASSERT_EQ(hub_.map().next_hops()[2], kFirst);
+  hub_.end_link(kFirst);
+  EXPECT_EQ(hub_.map().next_hops()[2], kParallel) << "before the pause between two maps is over";
+}
+
 TEST_F(HubWithTwoLinks, KeepsTheRouteOverABreakWithResume) {
   hub_.begin_connection(kFirst, to(two_), later_);
   hub_.advance(later_);
