@@ -84,6 +84,8 @@ std::string text_of(const std::vector<MemberStatus>& members, bool exact, Paint 
 namespace {
 
 constexpr Timeout kMemberPatience{5000};
+/// No further hub is asked then: very many may be silent.
+constexpr std::int64_t kAskUntilNs = 10'000'000'000;
 /// The last frames of a link are confirmed with its keep-alive (250 ms), so counts of links that
 /// have just become idle agree a moment later.
 constexpr std::int64_t kSettledWithinNs = 1'000'000'000;
@@ -115,16 +117,23 @@ MemberStatus ask_member(ToolSession& session, const NetworkHub& hub) {
   return member;
 }
 
-/// One answer of each hub. Silent hubs cost one patience in all, where at most kAskersMax are.
+/// One answer of each hub. Silent hubs cost one patience in all where at most kAskersMax are, and
+/// never more than kAskUntilNs and one patience.
 Outcome<std::vector<MemberStatus>> ask_all(ToolSession& session) {
   const auto hubs = session.node().hubs(kMemberPatience);
   if (!hubs) return hubs.failure();
   std::vector<MemberStatus> members(hubs->size());
-  // relaxed: each number is taken once, and the futures hand over what was written.
   std::atomic<std::size_t> next{0};
+  const std::int64_t until_ns = steady_now_ns() + kAskUntilNs;
   const auto work = [&] {
-    for (std::size_t i = 0; (i = next.fetch_add(1, std::memory_order_relaxed)) < members.size();)
-      members[i] = ask_member(session, (*hubs)[i]);
+    // relaxed: each number is taken once, and the futures hand over what was written.
+    for (std::size_t i = 0; (i = next.fetch_add(1, std::memory_order_relaxed)) < members.size();) {
+      const NetworkHub& hub = (*hubs)[i];
+      members[i] =
+          steady_now_ns() < until_ns
+              ? ask_member(session, hub)
+              : MemberStatus{hub.hub_id, hub.name, {}, {}, "not asked: too many are silent"};
+    }
   };
   const SignalsBlocked blocked;
   std::vector<std::future<void>> askers;
