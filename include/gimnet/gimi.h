@@ -65,10 +65,10 @@ GIMNET_API gimi_status gimi_join(const gimi_node_options* options, gimi_handle* 
  * wait answer GIMI_CLOSED, what was received still comes. The handle stays, for gimi_state() and
  * gimi_lost(), until gimi_close(). */
 GIMNET_API gimi_status gimi_leave(gimi_handle node);
-/** Ends a handle of any kind; of a node, leaves first. The end of a publisher, subscription or
- * watch asks the hub and waits for its answer, a second at most. Calls that wait in it to receive
- * answer GIMI_CLOSED; others end as they would have. GIMI_CLOSED: no such handle, and nothing was
- * done. */
+/** Ends a handle of any kind; of a node, leaves first. The end of a publisher, subscription,
+ * accepted service or watch asks the hub and waits for its answer, a second at most. Calls that
+ * wait in it to receive answer GIMI_CLOSED; others end as they would have. GIMI_CLOSED: no such
+ * handle, and nothing was done. */
 GIMNET_API gimi_status gimi_close(gimi_handle handle);
 /** The own id; 0: no such node, or it left. */
 GIMNET_API gimi_peer gimi_id(gimi_handle node);
@@ -128,11 +128,11 @@ GIMNET_API uint64_t gimi_unsent(gimi_handle publisher);
 /** GIMI_OK until the hub says that it does not keep the last message, a moment after
  * gimi_publish(); GIMI_NOT_RETAINED (why). */
 GIMNET_API gimi_status gimi_retained(gimi_handle publisher);
-/** GIMI_OK: the hub has this publisher or subscription, or will be told with the next connection.
- * Otherwise why it did not take it again after a break or another name. */
+/** GIMI_OK: the hub has this publisher, subscription or accepted service, or will be told with the
+ * next connection. Otherwise why it did not take it again after a break or another name. */
 GIMNET_API gimi_status gimi_standing(gimi_handle handle);
-/** Copies the full name of the service of a publisher, subscription or sender, cut to size - 1
- * bytes; "" of a sender to a node. */
+/** Copies the full name of the service of a publisher, subscription, accepted service or sender,
+ * cut to size - 1 bytes; "" of a sender to a node. */
 GIMNET_API gimi_status gimi_service_name(gimi_handle handle, char* name, size_t size);
 
 /** Subscribes to a service by its full name; it need not exist yet. Each call makes a queue of its
@@ -151,10 +151,11 @@ GIMNET_API gimi_status gimi_wait_until_exists(gimi_handle subscription, int32_t 
 
 /* ---------------------------------------------------------------- services: commands */
 
-/** Lists the service `own name/name`, to which others send, until the node is closed, and makes the
- * queue of what they send. As gimi_advertise(). */
+/** Lists the service `own name/name`, to which others send, and makes a queue of its own for what
+ * they send, from which gimi_receive() takes. gimi_close() of the handle withdraws the service.
+ * Errors: as gimi_advertise(). */
 GIMNET_API gimi_status gimi_accept(gimi_handle node, const char* name,
-                                   const gimi_accept_options* options, gimi_handle* queue);
+                                   const gimi_accept_options* options, gimi_handle* accepted);
 /** A stream to who accepts the service of that full name, with its key. It follows the service to
  * another node. GIMI_NOT_FOUND (no such service now, or one that gives data), GIMI_BAD_NAME,
  * GIMI_BAD_ARGUMENT (also other options than an earlier sender of this node to it), GIMI_LIMIT,
@@ -195,8 +196,8 @@ GIMNET_API gimi_status gimi_drain(gimi_handle node, int32_t timeout_ms);
  * keys. */
 GIMNET_API gimi_status gimi_queue(gimi_handle node, gimi_key key, const gimi_queue_options* options,
                                   gimi_handle* queue);
-/** Takes the oldest message of a subscription or queue; of a node, the one that waited longest in
- * any. GIMI_TIMEOUT, GIMI_SILENCE, GIMI_CLOSED. Release it. */
+/** Takes the oldest message of a subscription, queue or accepted service; of a node, the one that
+ * waited longest in any. GIMI_TIMEOUT, GIMI_SILENCE, GIMI_CLOSED. Release it. */
 GIMNET_API gimi_status gimi_receive(gimi_handle source, int32_t timeout_ms, gimi_message* message);
 /** Takes the newest message of a subscription or queue and drops the others, which counts as taking
  * them. GIMI_TIMEOUT: there is none. */

@@ -200,14 +200,14 @@ class Node : public HubAccess {
       return gimi_advertise(handle_, detail::c_text(name).c_str(), &how, made);
     });
   }
-  /// Lists the service `own name/name`, to which others send, until the node is closed. Errors: as
-  /// advertise().
-  Outcome<Queue> accept(std::string_view name, const AcceptOptions& options = {},
-                        Timeout timeout = Timeout{5000}) const {
+  /// Lists the service `own name/name`, to which others send, and gives the queue of what they
+  /// send. It ends with the last copy of that. Errors: as advertise().
+  Outcome<Accepted> accept(std::string_view name, const AcceptOptions& options = {},
+                           Timeout timeout = Timeout{5000}) const {
     const std::string metadata = detail::c_text(options.metadata);
     gimi_accept_options how = detail::options_of(options, timeout);
     how.metadata = metadata.c_str();
-    return detail::made<Queue>([&](gimi_handle* made) {
+    return detail::made<Accepted>([&](gimi_handle* made) {
       return gimi_accept(handle_, detail::c_text(name).c_str(), &how, made);
     });
   }

@@ -36,8 +36,9 @@ typedef struct gimi_message {
   const void*
       data; /**< NULL if size is 0. More than 8 KiB are aligned to 64. Valid until: release. */
   size_t size;
-  const char* service; /**< Full name of the service that published it, "" for one that was sent to
-                          this node. NULL in an empty struct. Valid until: release. */
+  const char* service; /**< Full name of the service that published it, or of the own service to
+                          which it was sent; "" for one that was sent to this node. NULL in an
+                          empty struct. Valid until: release. */
   const gimi_identity* identity; /**< NULL: not known. */
   int64_t sent_ns;               /**< When it was sent, by the sender's clock, ns since 1970. */
   int64_t arrival_ns;            /**< When it was read here, by this machine's clock. */

@@ -43,7 +43,7 @@ class Message:
     def __init__(self, raw: Any, data: memoryview) -> None:
         self.data = data
         self.service: str = raw.service.decode()
-        """Full name of the service that published it; "" for one that was sent to this node."""
+        """Full name of the service that published it, or of the own one to which it was sent; "": to this node."""
         self.sender = Peer(getattr(raw, "from"))
         self.sequence: int = raw.sequence
         self.key: Tuple[int, int] = (raw.key.type, raw.key.instance)

@@ -249,7 +249,8 @@ class Node(Waitable):
 
     def accept(self, name: str, *, queue: int = 0, key: Tuple[int, int] = (0, 0), metadata: str = "",
                timeout: float = 5.0) -> Source:
-        """Takes the commands that others send to `own name/name`, until close() or the end of the node."""
+        """Takes the commands that others send to `own name/name`, until close() or the end of the node. Each
+        accepted service has a queue of its own."""
         options = sized(_c.gimi_accept_options, key=to_key(key), messages=queue, metadata=to_text(metadata),
                          timeout_ms=to_ms(timeout))
         return Source(self, self._opened(_c.lib.gimi_accept, to_text(name), options), kept=True)

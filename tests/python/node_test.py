@@ -94,6 +94,22 @@ class Nodes(TwoNodes):
         with self.assertRaises(gimnet.NotFound):
             self.viewer.send("robot/nothing", "x")
 
+    def test_accepted_services_have_their_own_messages_and_end(self):
+        drive, stop = self.robot.accept("drive"), self.robot.accept("stop")
+        for text in ("stop", "drive"):
+            self.viewer.send(f"robot/{text}", text)
+        for accepted, text in ((drive, "drive"), (stop, "stop")):
+            message = accepted.receive(PATIENCE_S)
+            self.assertEqual((message.text, message.service), (text, f"robot/{text}"))
+        drive.close()
+        self.assertEqual([service.name for service in self.viewer.services("robot/*")], ["robot/stop"])
+        again = self.robot.accept("drive")
+        with self.assertRaises(gimnet.Taken):
+            self.robot.accept("drive")
+        with gimnet.connect(hub=self.hub.url) as other:
+            other.send("robot/drive", "again")
+        self.assertEqual(again.receive(PATIENCE_S).text, "again")
+
     def test_asks_and_answers(self):
         add = self.robot.answer("add")
 

@@ -42,17 +42,17 @@ namespace detail {
   return counts;
 }
 
-[[nodiscard]] inline std::string service_name(const Handle& handle) {
+[[nodiscard]] inline std::string service_name(gimi_handle handle) {
   std::string name(GIMI_NAME_BYTES_MAX * 2 + 2, '\0');
-  static_cast<void>(gimi_service_name(handle.value(), name.data(), name.size()));
+  static_cast<void>(gimi_service_name(handle, name.data(), name.size()));
   name.resize(name.find('\0'));
   return name;
 }
 
 }  // namespace detail
 
-/// Messages that were received and wait: a ring buffer for one (type, instance), or for one
-/// subscription.
+/// Messages that were received and wait: a ring buffer for one (type, instance), for one
+/// subscription, or for one accepted service.
 class Queue {
  public:
   /// Takes the oldest. Waits if there is none. Errors: timeout, closed.
@@ -92,6 +92,22 @@ class Queue {
 
   detail::SharedHandle handle_;  ///< null: there is no queue ...
   Failure failure_;              ///< ... and why
+};
+
+/// An own service that takes data: the queue of what others send to it. Copies are the same
+/// service; with the last one it ends, as a Publisher does. A Queue that is copied from it counts
+/// as a copy.
+class Accepted : public Queue {
+ public:
+  /// In full, as it is now: another one after Node::take_name().
+  [[nodiscard]] std::string name() const { return detail::service_name(c_handle()); }
+  /// As Publisher::standing().
+  [[nodiscard]] Outcome<void> standing() const {
+    return detail::outcome_of(gimi_standing(c_handle()));
+  }
+
+  /// Made by Node.
+  explicit Accepted(detail::SharedHandle handle) : Queue(std::move(handle)) {}
 };
 
 /// The fate of the messages of one stream.
@@ -145,7 +161,7 @@ class Sender {
   /// The node; nobody (id 0) of a stream to a service.
   [[nodiscard]] Peer peer() const { return Peer{gimi_sends_to(handle_->value())}; }
   /// The service by its full name; "" of a stream to a node.
-  [[nodiscard]] std::string service() const { return detail::service_name(*handle_); }
+  [[nodiscard]] std::string service() const { return detail::service_name(handle_->value()); }
 
   /// Made by Node.
   explicit Sender(detail::SharedHandle handle) : handle_(std::move(handle)) {}
@@ -239,7 +255,7 @@ class Publisher {
     return count;
   }
   /// In full, as it is now: another one after Node::take_name().
-  [[nodiscard]] std::string name() const { return detail::service_name(*handle_); }
+  [[nodiscard]] std::string name() const { return detail::service_name(handle_->value()); }
   /// Messages that publish() sent.
   [[nodiscard]] std::uint64_t published() const { return gimi_published(handle_->value()); }
   /// Messages that publish() dropped, since the hub was away.
@@ -289,7 +305,7 @@ class Subscription {
     return detail::outcome_of(gimi_wait_until_exists(handle_->value(), milliseconds_of(timeout)));
   }
   /// In full.
-  [[nodiscard]] std::string name() const { return detail::service_name(*handle_); }
+  [[nodiscard]] std::string name() const { return detail::service_name(handle_->value()); }
   /// Messages that this program does not get: those that did not come, by their sequence, and those
   /// that the queue overwrote. Of Delivery::latest they were skipped for newer ones.
   [[nodiscard]] std::uint64_t missed() const { return detail::counts(handle_->value()).missed; }

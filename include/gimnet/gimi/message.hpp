@@ -162,7 +162,8 @@ class Message {
   /// NodeState::reconnects of its node when it came: if it grows from one message to the next, the
   /// connection to the hub was broken between them.
   [[nodiscard]] std::uint32_t reconnects() const { return message_.reconnects; }
-  /// Full name of the service it was published by; "" for one that was sent to this node.
+  /// Full name of the service that published it, or of the own service to which it was sent; "" for
+  /// one that was sent to this node.
   [[nodiscard]] std::string_view service() const {
     return message_.service != nullptr ? message_.service : "";
   }

@@ -78,6 +78,18 @@ struct QueueObject final : Source {
   using Source::Source;
 };
 
+struct AcceptedObject final : Source {
+  static constexpr HandleKind kKind = HandleKind::accepted;
+  AcceptedObject(SharedCore the_core, AcceptedTable::Service the_service)
+      : Source(std::move(the_core), the_service->queue), service(std::move(the_service)) {}
+  ~AcceptedObject() override {
+    // In that order: a message that still comes is not acknowledged.
+    core->accepted().remove(service);
+    core->services().withdraw_accepted(service->name());
+  }
+  const AcceptedTable::Service service;
+};
+
 struct SenderObject final : Object {
   static constexpr HandleKind kKind = HandleKind::sender;
   SenderObject(SharedCore the_core, StreamTable::Stream the_stream)
@@ -139,12 +151,17 @@ gimi_status with_core(gimi_handle node, const Body& body) noexcept {
   return with<NodeObject>(node, [&](NodeObject& object) { return body(*object.core); });
 }
 
-/// The same for a subscription or a queue.
+/// Is it the kind of a Source?
+[[nodiscard]] inline bool is_source(HandleKind kind) {
+  return kind == HandleKind::subscription || kind == HandleKind::queue ||
+         kind == HandleKind::accepted;
+}
+
+/// The same for a subscription, a queue or an accepted service.
 template <class Body>
 gimi_status with_source(gimi_handle handle, const Body& body) noexcept {
   const ObjectRef ref = find_object(handle);
-  const bool fits = ref.kind() == HandleKind::subscription || ref.kind() == HandleKind::queue;
-  if (ref.object() == nullptr || !fits) return no_object(ref);
+  if (ref.object() == nullptr || !is_source(ref.kind())) return no_object(ref);
   return guarded([&] { return body(static_cast<Source&>(*ref.object())); });
 }
 

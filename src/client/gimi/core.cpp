@@ -45,10 +45,11 @@ Core::Core(const NodeOptions& options)
       watches_(uplink_),
       requests_(uplink_, [this] { clerk_.attend(true); }),
       answers_(uplink_, options.receive_bytes),
+      accepted_(uplink_, inbox_),
       clerk_(uplink_, streams_, &requests_, &inbox_),
-      reception_(
-          {uplink_, inbox_, streams_, services_, pings_, requests_, answers_, clerk_, losses_},
-          options.message_bytes_max) {}
+      reception_({uplink_, inbox_, streams_, services_, pings_, requests_, answers_, accepted_,
+                  clerk_, losses_},
+                 options.message_bytes_max) {}
 
 Core::~Core() { close(); }
 
@@ -138,6 +139,7 @@ void Core::end(const Ending& ending) {
   pings_.end(ending);
   requests_.end(ending);
   answers_.end(ending);
+  accepted_.end(ending);
   connection_.end(ending);
 }
 
@@ -229,13 +231,19 @@ nif_verdict Core::dispatch(const nif_incoming& in) {
     case NIF_SERVICE_MOVED:
       return verdict_of(services_.on_service_moved(in));
     case NIF_OWN_SERVICE_MOVED:
-      return verdict_of(services_.on_own_service_moved(
-          in.text, {in.former_group, in.group, ServiceTable::refusal_of(in)}));
+      return on_own_service_moved(in);
     case NIF_WATCHED:
       return watches_.on_watched(in) ? NIF_DONE : NIF_NOT_NOW;
     default:
       return NIF_DONE;
   }
+}
+
+nif_verdict Core::on_own_service_moved(const nif_incoming& in) {
+  const ServiceTable::OwnMove move{in.former_group, in.group, ServiceTable::refusal_of(in)};
+  ServiceTable::Place place = services_.on_own_service_moved(in.text, move);
+  if (place == ServiceTable::Place::unknown) place = accepted_.on_own_service_moved(in.text, move);
+  return verdict_of(place);
 }
 
 void Core::on_gap(const nif_incoming& in) {

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "base/mutex.hpp"
+#include "client/gimi/accepted_service.hpp"
 #include "client/gimi/answer_queue.hpp"
 #include "client/gimi/clerk.hpp"
 #include "client/gimi/connection_events.hpp"
@@ -33,7 +34,11 @@ class Core {
 
   void close() GIMNET_EXCLUDES(mutex_);
   /// The node was given this name by the hub, "" for none.
-  void on_renamed() { services_.on_renamed(state().name); }
+  void on_renamed() {
+    const std::string name = state().name;
+    services_.on_renamed(name);
+    accepted_.on_renamed(name);
+  }
 
   [[nodiscard]] const Home& home() const { return uplink_.home(); }
   [[nodiscard]] nif_node* node() const { return uplink_.node(); }
@@ -45,6 +50,7 @@ class Core {
   [[nodiscard]] WatchQueues& watches() { return watches_; }
   [[nodiscard]] OpenRequests& requests() { return requests_; }
   [[nodiscard]] AnswerTable& answers() { return answers_; }
+  [[nodiscard]] AcceptedTable& accepted() { return accepted_; }
   [[nodiscard]] ConnectionEvents& connection() { return connection_; }
   /// Something is to be looked after at certain times.
   void attend() { clerk_.attend(true); }
@@ -60,6 +66,7 @@ class Core {
 
   static nif_verdict on_incoming(void* user, const nif_incoming* in);
   [[nodiscard]] nif_verdict dispatch(const nif_incoming& in);
+  [[nodiscard]] nif_verdict on_own_service_moved(const nif_incoming& in);
   void on_gap(const nif_incoming& in);
   void on_connected(const nif_incoming& in);
   void on_disconnected(const nif_incoming& in);
@@ -74,6 +81,7 @@ class Core {
   WatchQueues watches_;
   OpenRequests requests_;
   AnswerTable answers_;
+  AcceptedTable accepted_;
   ConnectionEvents connection_;
   PingTable pings_;
   LossTally losses_;

@@ -91,6 +91,7 @@ gimi_status gimi_receive(gimi_handle source, int32_t timeout_ms, gimi_message* m
     switch (ref.kind()) {
       case HandleKind::subscription:
       case HandleKind::queue:
+      case HandleKind::accepted:
         return receive(static_cast<Source&>(*ref.object()), timeout_ms, *message);
       case HandleKind::node: {
         Core& core = *static_cast<NodeObject*>(ref.object())->core;

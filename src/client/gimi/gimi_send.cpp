@@ -76,9 +76,9 @@ Outcome<StreamTable::Stream> stream_to_service(Core& core, const ServiceRecord& 
 extern "C" {
 
 gimi_status gimi_accept(gimi_handle node, const char* name, const gimi_accept_options* options,
-                        gimi_handle* queue) {
-  if (queue != nullptr) *queue = 0;
-  if (name == nullptr || queue == nullptr) return is_null("gimi_accept(): name or queue");
+                        gimi_handle* accepted) {
+  if (accepted != nullptr) *accepted = 0;
+  if (name == nullptr || accepted == nullptr) return is_null("gimi_accept(): name or accepted");
   return with<NodeObject>(node, [&](NodeObject& found) {
     return with_options(options, "accept", "gimi_accept_options", [&](const auto& given) {
       const gimi_bytes& safe = given.safe_message;
@@ -91,11 +91,16 @@ gimi_status gimi_accept(gimi_handle node, const char* name, const gimi_accept_op
       if (given.messages > GIMI_QUEUE_MESSAGES_MAX) return bad_length(given.messages);
       how.metadata = text_of(given.metadata);
       Core& core = *found.core;
-      MessageQueue& made = core.inbox().queue(how.key, &how.queue);
-      const auto accepted = core.services().accept(core.state().name, name, how,
-                                                   timeout_in_options(given.timeout_ms));
-      if (!accepted) return fail(accepted.failure());
-      return give<QueueObject>(queue, found.core, made);
+      const std::string own_name = core.state().name;
+      AcceptedTable::Service service = core.accepted().add(own_name, name, how.queue);
+      const auto group =
+          core.services().accept(own_name, name, how, timeout_in_options(given.timeout_ms));
+      if (!group) {
+        core.accepted().remove(service);
+        return fail(group.failure());
+      }
+      core.accepted().place(service, *group);
+      return give<AcceptedObject>(accepted, found.core, std::move(service));
     });
   });
 }

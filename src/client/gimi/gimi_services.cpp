@@ -180,6 +180,10 @@ gimi_status gimi_standing(gimi_handle handle) {
       return answer(static_cast<SubscriptionObject*>(ref.object())->service().standing());
     });
   }
+  if (ref.object() != nullptr && ref.kind() == HandleKind::accepted) {
+    return guarded(
+        [&] { return answer(static_cast<AcceptedObject*>(ref.object())->service->standing()); });
+  }
   return with<PublisherObject>(
       handle, [](PublisherObject& found) { return answer(found.service.standing()); });
 }
@@ -196,6 +200,10 @@ gimi_status gimi_service_name(gimi_handle handle, char* name, size_t size) {
         return GIMI_OK;
       case HandleKind::subscription:
         copy_text(static_cast<SubscriptionObject*>(ref.object())->service().name(), name, size);
+        return GIMI_OK;
+      case HandleKind::accepted:
+        copy_text(static_cast<AcceptedObject*>(ref.object())->service->full_name()->text, name,
+                  size);
         return GIMI_OK;
       case HandleKind::sender:
         copy_text(static_cast<SenderObject*>(ref.object())->stream->service(), name, size);

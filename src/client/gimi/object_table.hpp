@@ -25,6 +25,7 @@ enum class HandleKind : std::uint8_t {
   answers = 8,
   wait_set = 9,
   connection = 10,
+  accepted = 11,
 };
 
 /// The object that a handle stands for. It lives until its handle is closed and the last call left

@@ -127,19 +127,36 @@ nif_verdict Reception::on_data(const nif_incoming& in, const proto::gimi::Messag
   if (view.data.size() > message_bytes_max_) return refuse(in, view);
   if (in.kind == NIF_GROUP) return on_group_data(in, view);
   const StreamName name = received_stream_of(in);
+  nif_verdict verdict = NIF_DONE;
+  const auto service = accepting(in, verdict);
+  if (!service) return verdict;
   StreamEpochs& epochs = received_.find({name.peer, in.kind, name.group, name.key});
   const StreamEpochs::Step step = epochs.look(view.header.epoch);
   if (step == StreamEpochs::Step::former) return drop_outdated();
-  Message message = with_age(make_message(in, view, nullptr, reconnects_), in);
+  const OwnedServiceName service_name = *service ? (*service)->full_name() : nullptr;
+  Message message = with_age(make_message(in, view, service_name.get(), reconnects_), in);
   if (step == StreamEpochs::Step::begins) message = begin_stream(std::move(message));
   AckReceipt receipt(clerk_, name, static_cast<Lane>(in.lane), view.header);
   const bool wanted = is_for_one(in) && view.header.has(proto::gimi::kFlagAckWanted);
-  if (!inbox_.put(name.key, message, wanted ? &receipt : nullptr)) {
+  Receipt* const told = wanted ? &receipt : nullptr;
+  const bool kept =
+      *service ? inbox_.put((*service)->queue, message, told) : inbox_.put(name.key, message, told);
+  if (!kept) {
     disown(std::move(message));
     return NIF_NOT_NOW;
   }
   epochs.take(view.header.epoch);
   return NIF_KEEP;
+}
+
+std::optional<AcceptedTable::Service> Reception::accepting(const nif_incoming& in,
+                                                           nif_verdict& verdict) {
+  if (in.kind != NIF_SERVICE) return nullptr;
+  auto [place, service] = accepted_.find(in.to);
+  if (place == ServiceTable::Place::unknown) losses_.add_unknown_service();
+  verdict = verdict_of(place);
+  if (service == nullptr) return std::nullopt;
+  return std::move(service);
 }
 
 nif_verdict Reception::on_plain(const nif_incoming& in) {
@@ -149,8 +166,14 @@ nif_verdict Reception::on_plain(const nif_incoming& in) {
     return NIF_DONE;
   }
   if (in.kind != NIF_GROUP) {
-    Message message = make_plain_message(in, data, nullptr, reconnects_);
-    if (inbox_.put(MessageKey{}, message, nullptr)) return NIF_KEEP;
+    nif_verdict verdict = NIF_DONE;
+    const auto service = accepting(in, verdict);
+    if (!service) return verdict;
+    const OwnedServiceName name = *service ? (*service)->full_name() : nullptr;
+    Message message = make_plain_message(in, data, name.get(), reconnects_);
+    const bool kept = *service ? inbox_.put((*service)->queue, message, nullptr)
+                               : inbox_.put(MessageKey{}, message, nullptr);
+    if (kept) return NIF_KEEP;
     disown(std::move(message));
     return NIF_NOT_NOW;
   }

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "client/gimi/accepted_service.hpp"
 #include "client/gimi/answer_queue.hpp"
 #include "client/gimi/clerk.hpp"
 #include "client/gimi/inbox.hpp"
@@ -38,6 +39,7 @@ class Reception {
     PingTable& pings;
     OpenRequests& requests;
     AnswerTable& answers;
+    AcceptedTable& accepted;
     Clerk& clerk;
     LossTally& losses;
   };
@@ -50,6 +52,7 @@ class Reception {
         pings_(parts.pings),
         requests_(parts.requests),
         answers_(parts.answers),
+        accepted_(parts.accepted),
         clerk_(parts.clerk),
         losses_(parts.losses),
         message_bytes_max_(message_bytes_max) {}
@@ -69,6 +72,10 @@ class Reception {
   [[nodiscard]] nif_verdict on_plain(const nif_incoming& in);
   [[nodiscard]] nif_verdict on_group_data(const nif_incoming& in,
                                           const proto::gimi::MessageView& view);
+  /// The own service to which a message was sent; none: to the node itself. Nothing: it is dropped
+  /// or comes again, as `verdict` says.
+  [[nodiscard]] std::optional<AcceptedTable::Service> accepting(const nif_incoming& in,
+                                                                nif_verdict& verdict);
   /// A message of a service, for its readers.
   [[nodiscard]] nif_verdict put(SubscribedService& service,
                                 const std::optional<SubscribedService::Position>& position,
@@ -90,6 +97,7 @@ class Reception {
   PingTable& pings_;
   OpenRequests& requests_;
   AnswerTable& answers_;
+  AcceptedTable& accepted_;
   Clerk& clerk_;
   LossTally& losses_;
   const std::size_t message_bytes_max_;

@@ -83,8 +83,8 @@ Outcome<PublishedService*> ServiceTable::advertise(const std::string& own_name,
   return published_.emplace_back(std::move(published)).get();
 }
 
-Outcome<void> ServiceTable::accept(const std::string& own_name, const std::string& name,
-                                   const AcceptOptions& options, Timeout timeout) {
+Outcome<std::uint32_t> ServiceTable::accept(const std::string& own_name, const std::string& name,
+                                            const AcceptOptions& options, Timeout timeout) {
   const MutexLock turn(asking_);
   if (auto failure = obstacle(own_name, name)) return *failure;
   nif_service service = description_of(name, options.key, options.metadata);
@@ -94,7 +94,7 @@ Outcome<void> ServiceTable::accept(const std::string& own_name, const std::strin
       nif_advertise(uplink_.node(), &service, &group, nullptr, nif_timeout(timeout));
   if (status != NIF_OK) return failure_of(status, "accept " + own_name + "/" + name);
   own_names_.insert(name);
-  return {};
+  return group;
 }
 
 void ServiceTable::withdraw(PublishedService& service) {

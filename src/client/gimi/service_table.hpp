@@ -36,8 +36,9 @@ class ServiceTable {
                                                      const std::string& name,
                                                      const PublishOptions& options, Timeout timeout)
       GIMNET_EXCLUDES(asking_, mutex_);
-  [[nodiscard]] Outcome<void> accept(const std::string& own_name, const std::string& name,
-                                     const AcceptOptions& options, Timeout timeout)
+  /// Lists a service that takes data; its group.
+  [[nodiscard]] Outcome<std::uint32_t> accept(const std::string& own_name, const std::string& name,
+                                              const AcceptOptions& options, Timeout timeout)
       GIMNET_EXCLUDES(asking_, mutex_);
   void withdraw(PublishedService& service) GIMNET_EXCLUDES(asking_, mutex_);
   /// Ends a service that accept() lists; `name` as there.

@@ -106,9 +106,9 @@ class RobotPort final : public GimiPort {
     options.key = key_of(Service::kDrive);
     options.queue = {kQueueMessages, kLossless};
     options.metadata = "wanted speed, Bitestream";
-    Outcome<Queue> queue = node().accept(kDriveName, options);
-    if (!queue) return Error{queue.failure().sentence};
-    drive_.emplace(std::move(*queue));
+    Outcome<Accepted> drive = node().accept(kDriveName, options);
+    if (!drive) return Error{drive.failure().sentence};
+    drive_.emplace(std::move(*drive));
     return std::nullopt;
   }
 
@@ -131,7 +131,7 @@ class RobotPort final : public GimiPort {
 
  private:
   std::vector<Publisher> publishers_;
-  std::optional<Queue> drive_;
+  std::optional<Accepted> drive_;
 };
 
 class ViewerPort final : public GimiPort {

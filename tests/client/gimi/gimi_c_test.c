@@ -63,9 +63,16 @@ static int talk_by_commands(gimi_handle robot, gimi_handle viewer) {
   EXPECT(strcmp(name, "robot/drive") == 0 && gimi_sends_to(drive) == 0);
   EXPECT(gimi_send(drive, "left", 4, WAIT_MS, 0) == GIMI_OK);
   EXPECT(gimi_receive(commands, WAIT_MS, &message) == GIMI_OK && message.size == 4);
+  EXPECT(strcmp(message.service, "robot/drive") == 0);
+  EXPECT(gimi_service_name(commands, name, sizeof name) == GIMI_OK);
+  EXPECT(strcmp(name, "robot/drive") == 0 && gimi_standing(commands) == GIMI_OK);
   gimi_message_release(&message);
   gimi_message_release(&message);
   EXPECT(gimi_close(drive) == GIMI_OK);
+  EXPECT(gimi_close(commands) == GIMI_OK);
+  EXPECT(gimi_receive(commands, WAIT_MS, &message) == GIMI_CLOSED);
+  EXPECT(gimi_sender_to_service(robot, "robot/drive", NULL, WAIT_MS, &drive) == GIMI_NOT_FOUND);
+  EXPECT(gimi_accept(robot, "drive", NULL, &commands) == GIMI_OK);
   EXPECT(gimi_leave(robot) == GIMI_OK);
   EXPECT(gimi_receive(commands, WAIT_MS, &message) == GIMI_CLOSED);
   EXPECT(gimi_close(commands) == GIMI_OK);

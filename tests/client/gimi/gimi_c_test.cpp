@@ -80,6 +80,7 @@ class GimiMisuse : public testing::Test {
     kPending = 64,
     kAnswers = 128,
     kWaitSet = 256,
+    kAccepted = 512,
   };
   struct Call {
     const char* name;
@@ -93,16 +94,17 @@ class GimiMisuse : public testing::Test {
     options.hub = hub_.url().c_str();
     options.name = "robot";
     ASSERT_EQ(gimi_join(&options, &node_), GIMI_OK);
-    handles_.resize(9);
+    handles_.resize(10);
     handles_[0] = node_;
     ASSERT_EQ(gimi_advertise(node_, "odom", nullptr, &handles_[1]), GIMI_OK);
     ASSERT_EQ(gimi_subscribe(node_, "robot/odom", nullptr, &handles_[2]), GIMI_OK);
-    ASSERT_EQ(gimi_accept(node_, "drive", nullptr, &handles_[3]), GIMI_OK);
+    ASSERT_EQ(gimi_queue(node_, {1, 2}, nullptr, &handles_[3]), GIMI_OK);
     ASSERT_EQ(gimi_sender(node_, gimi_id(node_), nullptr, &handles_[4]), GIMI_OK);
     ASSERT_EQ(gimi_watch(node_, nullptr, 0, 5000, &handles_[5]), GIMI_OK);
     ASSERT_EQ(gimi_answer(node_, "add", nullptr, &handles_[7]), GIMI_OK);
     ASSERT_EQ(gimi_ask_later(node_, "robot/add", nullptr, nullptr, &handles_[6]), GIMI_OK);
     ASSERT_EQ(gimi_wait_set_create(&handles_[8]), GIMI_OK);
+    ASSERT_EQ(gimi_accept(node_, "drive", nullptr, &handles_[9]), GIMI_OK);
   }
   void TearDown() override {
     for (std::size_t i = handles_.size(); i-- > 0;) EXPECT_EQ(gimi_close(handles_[i]), GIMI_OK);
@@ -138,7 +140,7 @@ std::vector<GimiMisuse::Call> GimiMisuse::calls() {
   static std::size_t number;
   static std::int32_t descriptor;
   static std::array<char, 8> text;
-  constexpr unsigned kQueues = kSubscription | kQueue;
+  constexpr unsigned kQueues = kSubscription | kQueue | kAccepted;
   using H = gimi_handle;
   return {
       {"leave", kNode, [](H h) { return gimi_leave(h); }},
@@ -162,8 +164,8 @@ std::vector<GimiMisuse::Call> GimiMisuse::calls() {
       {"receive_packed", kQueues, [](H h) { return gimi_receive_packed(h, 1, 0, &batch); }},
       {"resize", kQueues, [](H h) { return gimi_resize(h, 1); }},
       {"counts", kQueues, [](H h) { return gimi_counts(h, &counts); }},
-      {"standing", kPublisher | kSubscription, [](H h) { return gimi_standing(h); }},
-      {"service_name", kPublisher | kSubscription | kSender,
+      {"standing", kPublisher | kSubscription | kAccepted, [](H h) { return gimi_standing(h); }},
+      {"service_name", kPublisher | kSubscription | kSender | kAccepted,
        [](H h) { return gimi_service_name(h, text.data(), text.size()); }},
       {"watch_receive", kWatch, [](H h) { return gimi_watch_receive(h, 0, &event); }},
       {"wait_for_reply", kPending, [](H h) { return gimi_wait_for_reply(h, 0, &reply); }},

@@ -246,7 +246,8 @@ TEST_F(Services, WhatIsSentToOneAndToItsNodeAreTwoStreams) {
   }
   drive.settle(kWait).or_throw();
   direct.settle(kWait).or_throw();
-  EXPECT_EQ(commands.received(), 100u);
+  EXPECT_EQ(commands.received(), 50u);
+  EXPECT_EQ(robot.queue({5, 0}).received(), 50u);
 }
 
 TEST_F(Services, OnlyWhatAcceptsCanBeSentTo) {
@@ -316,7 +317,7 @@ TEST_F(Services, OnlyWhatGivesDataCanBeSubscribed) {
   const Node viewer = join();
   const Subscription early = viewer.subscribe("robot/drive").or_throw();
   std::optional<Node> robot = join("robot");
-  ASSERT_TRUE(robot->accept("drive", accepting({5, 0})));
+  const Accepted taking = robot->accept("drive", accepting({5, 0})).or_throw();
   EXPECT_TRUE(eventually([&] { return early.accepts(); }));
   EXPECT_FALSE(early.exists());
   const auto waited = early.wait_until_exists(Timeout{1});
