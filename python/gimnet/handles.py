@@ -189,10 +189,12 @@ class RawSet:
             _c.lib.gimi_close(self.handle)
 
     def poll(self, ms: int) -> None:
-        """Until the descriptor is readable. Python sees Ctrl-C meanwhile."""
+        """Until the descriptor is readable. Python sees Ctrl-C meanwhile, also if it comes just before a piece."""
         poll = select.poll()
         poll.register(self.descriptor, select.POLLIN)
-        poll.poll(ms)
+        end = time.monotonic() + ms / 1e3
+        while not poll.poll(min(ms, 2 * PIECE_MS)) and ms > 0:
+            ms = left_ms(end, TIMEOUT_MS_MAX)
 
     def wake(self) -> None:
         """Its descriptor is readable until unwake()."""

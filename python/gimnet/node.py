@@ -5,20 +5,28 @@ from __future__ import annotations
 import collections
 import ctypes
 from dataclasses import dataclass
-from typing import Any, Deque, Dict, Iterator, List, Optional, Tuple, Type, Union
+from typing import Any, Deque, Dict, Iterator, List, Optional, Set, Tuple, Type, Union
 
 from . import _c, errors, messages
+from .errand import interruptible
 from .handles import Exit, Handle, Raw, Stream, Waitable, in_pieces, sized, to_key, to_ms, to_text
 from .messages import Event, Message, NodeRecord, Peer, ServiceRecord
 from .requests import Answers, Pending, Reply
 
 __all__ = ["ConnectionEvent", "ConnectionWatch", "Node", "Publisher", "Source", "State", "Watch", "connect"]
 
+_SMALL_BYTES = 1 << 16
+
 
 def _peer(to: Peer) -> int:
     if not 0 <= to < 1 << 32:
         raise errors.BadArgument(f"{int(to)} is no node: a Peer is a number from 0 to 2**32 - 1")
     return to
+
+
+def _close(handle: ctypes.c_uint64) -> None:
+    """One that came after Ctrl-C, so that nobody has it."""
+    _c.lib.gimi_close(handle)
 
 
 class Source(Stream[Message]):
@@ -183,6 +191,7 @@ class Node(Waitable):
     def __init__(self, handle: int) -> None:
         super().__init__(handle)
         self._senders: Dict[Tuple[Union[str, Peer], str], int] = {}
+        self._asked: Set[str] = set()  # services, of which the library knows the place
         Exit.add(handle, self)
 
     def __enter__(self) -> Node:
@@ -192,6 +201,12 @@ class Node(Waitable):
         self.close()
 
     def _opened(self, function: Any, *arguments: Any) -> int:
+        """The handle of a call that may wait."""
+        handle = ctypes.c_uint64()
+        interruptible(lambda: self.check(function(self._handle, *arguments, handle)), lambda: _close(handle))
+        return handle.value
+
+    def _opened_at_once(self, function: Any, *arguments: Any) -> int:
         handle = ctypes.c_uint64()
         self.check(function(self._handle, *arguments, handle))
         return handle.value
@@ -206,7 +221,7 @@ class Node(Waitable):
 
     def watch_connection(self) -> ConnectionWatch:
         """Tells what becomes of the connection: lost, back, ended, and why."""
-        return ConnectionWatch(self, self._opened(_c.lib.gimi_watch_connection))
+        return ConnectionWatch(self, self._opened_at_once(_c.lib.gimi_watch_connection))
 
     @property
     def id(self) -> Peer:
@@ -268,7 +283,7 @@ class Node(Waitable):
         sender = self._senders.get((to, lane))
         if sender is None:
             options = sized(_c.gimi_send_options, lane=messages.chosen("lane", messages.LANES, lane))
-            made = (self._opened(_c.lib.gimi_sender, _peer(to), options) if isinstance(to, Peer) else
+            made = (self._opened_at_once(_c.lib.gimi_sender, _peer(to), options) if isinstance(to, Peer) else
                     self._opened(_c.lib.gimi_sender_to_service, to_text(to), options, to_ms(timeout)))
             sender = self._senders.setdefault((to, lane), made)
             if sender != made:  # another thread was faster
@@ -295,9 +310,15 @@ class Node(Waitable):
         block = _c.gimi_bytes(ctypes.cast(data, ctypes.c_void_p), size)
         options = sized(_c.gimi_request_options, timeout_ms=to_ms(timeout), repeat=repeat,
                         lane=messages.chosen("lane", messages.LANES, lane))
+        # A thread for each request would cost more than a short request.
+        at_once = service in self._asked and size <= _SMALL_BYTES
+        opened = self._opened_at_once if at_once else self._opened
         try:
-            return Pending(self, self._opened(_c.lib.gimi_ask_later, to_text(service), block, options))
+            pending = Pending(self, opened(_c.lib.gimi_ask_later, to_text(service), block, options))
+            self._asked.add(service)
+            return pending
         except errors.GimnetError as error:
+            self._asked.discard(service)
             error.ran = "no"
             raise
         finally:
@@ -306,7 +327,8 @@ class Node(Waitable):
     def find(self, name: str, timeout: float = 5.0) -> Peer:
         """A node by its name, or by its id as text (`7.17`). NotFound, BadName, Timeout."""
         peer = ctypes.c_uint32()
-        self.check(_c.lib.gimi_find(self._handle, to_text(name), to_ms(timeout), peer))
+        words, ms = to_text(name), to_ms(timeout)
+        interruptible(lambda: self.check(_c.lib.gimi_find(self._handle, words, ms, peer)))
         return Peer(peer.value)
 
     def nodes(self, pattern: str = "", timeout: float = 5.0) -> List[NodeRecord]:
@@ -319,8 +341,9 @@ class Node(Waitable):
 
     def _list(self, function: Any, record: Type[Raw], pattern: str, timeout: float) -> Iterator[Raw]:
         """Each is valid until the next one."""
-        records = _c.gimi_list()
-        self.check(function(self._handle, to_text(pattern), to_ms(timeout), records))
+        records, words, ms = _c.gimi_list(), to_text(pattern), to_ms(timeout)
+        interruptible(lambda: self.check(function(self._handle, words, ms, records)),
+                      lambda: _c.lib.gimi_list_release(records))
         try:
             for index in range(records.count):
                 raw = record()
@@ -350,5 +373,5 @@ def connect(name: str = "", *, hub: str = "", description: str = "", timeout: fl
     options = sized(_c.gimi_node_options, name=to_text(name), hub=to_text(hub), description=to_text(description),
                      timeout_ms=to_ms(timeout), wait_for_hub=wait_for_hub, number_if_taken=number_if_taken)
     handle = ctypes.c_uint64()
-    errors.check(_c.lib.gimi_join(options, handle))
+    interruptible(lambda: errors.check(_c.lib.gimi_join(options, handle)), lambda: _close(handle))
     return Node(handle.value)

@@ -3,16 +3,18 @@
 
 import asyncio
 import os
+import pathlib
 import select
 import signal
 import sys
 import threading
+import time
 import unittest
 import unittest.mock
 
 import gimnet
 from support.processes import Hub
-from support.waiting import PATIENCE_S
+from support.waiting import PATIENCE_S, wait_until
 from two_nodes import TwoNodes, program
 
 
@@ -246,6 +248,40 @@ class Endings(unittest.TestCase):
             process.send_signal(signal.SIGINT)
             out, err = process.communicate(timeout=PATIENCE_S)
             self.assertEqual((out, err, process.returncode), ("ended\n", "", 0), wait)
+
+    def test_ctrl_c_ends_calls_that_ask_the_hub(self):
+        """The hub says nothing, so that each would wait for long; what the call still brings is ended later."""
+        calls = ["node.find('zz', timeout=T)", "node.nodes(timeout=T)", "node.services(timeout=T)", "node.advertise('p', timeout=T)",
+                 "node.subscribe('x/y', timeout=T)", "node.accept('c', timeout=T)", "node.answer('q', timeout=T)",
+                 "node.watch(timeout=T)", "node.send('x/y', 'm', timeout=T)", "node.request('x/q', 'm', timeout=T)",
+                 "gimnet.connect('late', hub=hub, timeout=T)", "gimnet.connect(hub='unix:/none', wait_for_hub=True, timeout=T)"]
+        processes = []
+        for number, call in enumerate(calls):
+            lines = ("print('connected', flush=True)\nsys.stdin.readline()\ntry:\n print('ready', flush=True)\n"
+                     f" {call.replace('timeout=T', f'timeout={10 * PATIENCE_S}')}\n"
+                     "except KeyboardInterrupt: print('ended', flush=True)\n"
+                     f"node.nodes(timeout={PATIENCE_S})\nprint('answered', flush=True)\nsys.stdin.read()")
+            processes.append((call, program(lines, self.hub, f"b{number}")))
+            self.assertEqual(processes[-1][1].stdout.readline(), "connected\n", call)
+        self.hub.process.signal(signal.SIGSTOP)
+        for call, process in processes:
+            process.stdin.write("\n")
+            process.stdin.flush()
+            self.assertEqual(process.stdout.readline(), "ready\n")
+            stat = pathlib.Path(f"/proc/{process.pid}/stat")
+            wait_until(lambda stat=stat: stat.read_text(encoding="utf-8").split()[2] == "S", f"waiting in {call}")
+            process.send_signal(signal.SIGINT)
+            begun = time.monotonic()
+            self.assertEqual(process.stdout.readline(), "ended\n", call)
+            self.assertLess(time.monotonic() - begun, PATIENCE_S, call)
+        self.hub.process.signal(signal.SIGCONT)
+        for call, process in processes:
+            self.assertEqual(process.stdout.readline(), "answered\n", call)
+        with gimnet.connect(hub=self.hub.url) as viewer:
+            wait_until(lambda: not viewer.services("*/p") + viewer.services("*/q"), "the end of the services")
+            wait_until(lambda: "late" not in [node.name for node in viewer.nodes()], "the end of the late node")
+        for call, process in processes:
+            self.assertEqual((process.communicate(timeout=PATIENCE_S), process.returncode), (("", ""), 0), call)
 
     def test_a_program_ends_while_threads_wait(self):
         lines = """
