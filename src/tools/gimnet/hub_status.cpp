@@ -100,7 +100,8 @@ void write(JsonWriter& json, const Ledger& ledger) {
 std::string text_of(const Ledger& ledger) {
   return "ledger: " + std::to_string(ledger.accepted) + " accepted + " +
          std::to_string(ledger.copies) + " copies = " + std::to_string(ledger.delivered) +
-         " delivered + " + std::to_string(ledger.dropped) + " dropped + " +
+         " delivered + " + std::to_string(ledger.dropped - ledger.wrong_way) + " dropped + " +
+         (ledger.wrong_way == 0 ? "" : std::to_string(ledger.wrong_way) + " by another way + ") +
          std::to_string(ledger.queued) + " queued" +
          (ledger.exact() ? "" : " (not balanced: frames are on their way)");
 }
@@ -121,8 +122,9 @@ Counters summed(const std::vector<ShardCounts>& shards) {
 }
 
 Ledger ledger_of(const Counters& counters) {
-  Ledger ledger{value_of(counters, "accepted"), value_of(counters, "copies"),
-                value_of(counters, "delivered"), 0, value_of(counters, "queued")};
+  Ledger ledger{value_of(counters, "accepted"),  value_of(counters, "copies"),
+                value_of(counters, "delivered"), 0,
+                value_of(counters, "queued"),    value_of(counters, "dropped.wrong_way")};
   for (const auto& [name, value] : counters) {
     if (name.starts_with(kDropped)) ledger.dropped += value;
   }

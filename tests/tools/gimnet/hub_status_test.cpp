@@ -35,6 +35,9 @@ TEST(HubStatus, SumsShardsAndKeepsTheLargestOfMaxima) {
 TEST(HubStatus, BalancesTheLedger) {
   Ledger ledger = ledger_of(summed(status().shards));
   EXPECT_EQ(ledger.dropped, 1u);
+  EXPECT_EQ(
+      text_of(ledger_of({{"accepted", 7}, {"dropped.away", 2}, {"dropped.wrong_way", 5}})),
+      "ledger: 7 accepted + 0 copies = 0 delivered + 2 dropped + 5 by another way + 0 queued");
   EXPECT_TRUE(ledger.exact());
   ledger.queued = 0;
   EXPECT_FALSE(ledger.exact());
@@ -71,7 +74,8 @@ TEST(HubStatus, IsWrittenForPeople) {
       << text;
   EXPECT_NE(text.find("dropped.away: 1"), std::string::npos);
   EXPECT_NE(text.find("7.1  robot"), std::string::npos);
-  EXPECT_NE(text.find("connected  100       20         3        0       9"), std::string::npos) << text;
+  EXPECT_NE(text.find("connected  100       20         3        0       9"), std::string::npos)
+      << text;
 }
 
 }  // namespace
