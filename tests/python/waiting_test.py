@@ -258,7 +258,7 @@ class Endings(unittest.TestCase):
         processes = []
         for number, call in enumerate(calls):
             lines = ("print('connected', flush=True)\nsys.stdin.readline()\ntry:\n print('ready', flush=True)\n"
-                     f" {call.replace('timeout=T', f'timeout={10 * PATIENCE_S}')}\n"
+                     f" {call.replace('timeout=T', f'timeout={2 * PATIENCE_S}')}\n"
                      "except KeyboardInterrupt: print('ended', flush=True)\n"
                      f"node.nodes(timeout={PATIENCE_S})\nprint('answered', flush=True)\nsys.stdin.read()")
             processes.append((call, program(lines, self.hub, f"b{number}")))
