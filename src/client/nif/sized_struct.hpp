@@ -37,16 +37,18 @@ template <class Struct>
 [[nodiscard]] std::optional<Failure> read_struct(const Struct*& given, Struct& whole,
                                                  const char* doing, const char* name) {
   const std::size_t size = given->struct_size;
-  const auto bad = [&](const std::string& why) {
+  const auto bad = [&](const char* why) {
     return Failure{NIF_BAD_ARGUMENT, std::string("cannot ") + doing + ": " + name + why};
   };
-  const std::string unknown = " asks for something that this version of the library does not have";
+  // No std::string before it is needed: each message comes by here.
+  constexpr const char* unknown =
+      " asks for something that this version of the library does not have";
   if (size == sizeof(Struct)) {
     if (sets_reserved(*given)) return bad(unknown);
     return std::nullopt;
   }
   if (size < sizeof(std::size_t) || size > kStructSizeMax)
-    return bad(std::string(".struct_size is not sizeof(") + name + ")");
+    return bad((std::string(".struct_size is not sizeof(") + name + ")").c_str());
   const auto* bytes = reinterpret_cast<const unsigned char*>(given);
   const auto asked = [](unsigned char byte) { return byte != 0; };
   if (size > sizeof whole && std::any_of(bytes + sizeof whole, bytes + size, asked))
