@@ -247,6 +247,13 @@ TEST_F(StreamTableTest, AcknowledgesWhatCameForAServiceInItsName) {
   std::string payload(proto::gimi::kMessageHeaderSize, '\0');
   payload[4] = 1;                                               // sequence 1
   payload[9] = static_cast<char>(proto::gimi::kFlagAckWanted);  // of DATA
+  std::optional<Accepted> accepted;
+  std::thread accepting([&] { accepted.emplace(node_->accept("go", {.key = kKey}).or_throw()); });
+  std::uint16_t number = 0;
+  EXPECT_TRUE(hub_.next_request<ns::Advertise>(number));
+  hub_.send_control(proto::Kind::ns,
+                    proto::encode_answer(ns::AdvertiseAnswer{GroupId{kGroup}}, number));
+  accepting.join();
   hub_.send(parts, payload + "go");
   const Taken ack = next();
   EXPECT_EQ(ack.header.operation, MessageOperation::ack);
@@ -256,7 +263,7 @@ TEST_F(StreamTableTest, AcknowledgesWhatCameForAServiceInItsName) {
       proto::gimi::decode_ack(std::as_bytes(std::span(ack.data.data(), ack.data.size())));
   ASSERT_TRUE(read);
   EXPECT_EQ(read->group, kGroup);
-  EXPECT_EQ(node_->receive(kKey, kForever)->text(), "go");
+  EXPECT_EQ(accepted->receive(kForever)->text(), "go");
 }
 
 }  // namespace

@@ -111,9 +111,9 @@ TEST(CtrlNetworkMessages, RefuseAListOfLinksThatIsCut) {
 TEST(CtrlNetworkMessages, EachStateHasAName) {
   EXPECT_STREQ(link_state_name(LinkState::dialling), "dialling");
   EXPECT_STREQ(link_state_name(LinkState::up), "up");
-  for (std::uint16_t state = 0; state <= static_cast<std::uint16_t>(LinkState::up); ++state)
+  for (std::uint16_t state = 0; state <= static_cast<std::uint16_t>(LinkState::ended); ++state)
     EXPECT_STRNE(link_state_name(LinkState{state}), "unknown") << state;
-  EXPECT_STREQ(link_state_name(LinkState{6}), "unknown");
+  EXPECT_STREQ(link_state_name(LinkState{7}), "unknown");
 }
 
 TEST(CtrlNetworkMessages, RecordsFitInTheBytesThatArePlannedForThem) {
