@@ -39,10 +39,11 @@ class World final : public nif::InboundHost {
         services_(uplink_, inbox_, [](const std::string&, const ServicePlace&) {}),
         requests_(uplink_, [] {}),
         answers_(uplink_, 1 << 20),
+        accepted_(uplink_, inbox_),
         clerk_(uplink_, streams_, &requests_),
-        reception_(
-            {uplink_, inbox_, streams_, services_, pings_, requests_, answers_, clerk_, losses_},
-            kMessageBytesMax),
+        reception_({uplink_, inbox_, streams_, services_, pings_, requests_, answers_, accepted_,
+                    clerk_, losses_},
+                   kMessageBytesMax),
         queue_(inbox_.queue(kKey, nullptr)),
         inbound_(kLimits, *this) {
     nif::SessionTerms session;
@@ -106,6 +107,7 @@ class World final : public nif::InboundHost {
   PingTable pings_;
   OpenRequests requests_;
   AnswerTable answers_;
+  AcceptedTable accepted_;
   Clerk clerk_;
   LossTally losses_;
   Reception reception_;

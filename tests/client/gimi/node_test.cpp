@@ -159,15 +159,12 @@ TEST_F(NodeTest, RefusesASecondSenderWithOtherOptions) {
   ASSERT_TRUE(refused.is(Status::bad_argument));
   EXPECT_NE(refused.failure().sentence.find("another key"), std::string::npos);
   EXPECT_TRUE(sender.sender(receiver.peer(), {.key = {1, 0}})) << "that is another stream";
-  sender.send("B/drive", "1", synchronized).or_throw();
-  sender.send("B/drive", "2", synchronized).or_throw();
+  sender.send("B/drive", "3", synchronized).or_throw();
   const auto other = sender.sender("B/drive");
   ASSERT_TRUE(other.is(Status::bad_argument));
   EXPECT_NE(other.failure().sentence.find("B/drive"), std::string::npos);
-  for (const char* text : {"1", "2"}) {
-    EXPECT_EQ(drive.receive(kWait).or_throw().text(), text);
-    EXPECT_EQ(receiver.receive(kWait).or_throw().text(), text) << "sent to the node itself";
-  }
+  for (const char* text : {"1", "2"}) EXPECT_EQ(receiver.receive(kWait).or_throw().text(), text);
+  EXPECT_EQ(drive.receive(kWait).or_throw().text(), "3") << "sent to the service";
 }
 
 TEST_F(NodeTest, StampsMessages) {
