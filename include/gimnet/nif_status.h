@@ -90,7 +90,7 @@ typedef enum nif_drop_reason {
   /** Of a NIF_REPORT only: the message reached the subscribers of an own service with retain, but
    * its hub does not keep it for later ones. */
   NIF_DROP_NOT_RETAINED = 21,
-  NIF_DROP_LINK_UNSURE = 22 /**< A link between two hubs broke: it may have arrived. */
+  NIF_DROP_LINK_UNSURE = 22 /**< A connection on the way broke: it may have arrived. */
 } nif_drop_reason;
 
 #ifdef __cplusplus

@@ -229,7 +229,7 @@ class Conversation(unittest.TestCase):
                      for frames in ("frames_sent", "frames_got"))
         # A list of two, and a frame for nobody. The viewer asked for resume, and left without a word on what it had got.
         player.hub.expect_ledger(self, accepted=sum(sent.values()), copies=1, delivered=sum(got.values()) - got["viewer"],
-                                 dropped={"no_such_node": 1, "link_lost": got["viewer"]})
+                                 dropped={"no_such_node": 1, "link_unsure": got["viewer"]})
 
     def test_the_hub_of_today_plays_each_scene_as_it_did(self):
         for name, scene in SCENES.items():

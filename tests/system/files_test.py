@@ -48,7 +48,7 @@ class Files(unittest.TestCase):
                 with self.subTest(shards=shards, size=size):
                     self.send_file(tap, size)
             # A sender that waits long asks whether its receiver is still there, which may have everything by then, and end.
-            vain = {reason: lambda name=reason: hub.counter(f"dropped.{name}") for reason in ("link_lost", "no_such_node")}
+            vain = {reason: lambda name=reason: hub.counter(f"dropped.{name}") for reason in ("link_lost", "link_unsure", "no_such_node")}
             status = hub.expect_ledger(self, accepted=tap.sent, dropped=vain,
                                        delivered=lambda: tap.sent() - sum(count() for count in vain.values()))
             delivered, dropped = status["ledger"]["delivered"], status["ledger"]["dropped"]

@@ -124,22 +124,19 @@ void Closer::tell(const Connection& connection, bool said_by_peer, proto::Goodby
 
 void Closer::lose_unconfirmed(Connection& connection, const Run& partial) {
   std::uint64_t lost = 0;
-  std::uint64_t may_have_arrived = 0;
-  // The hub at the other end of a link goes on: a frame may have arrived there.
-  const auto unsure =
-      connection.is_link() ? proto::DropReason::link_unsure : proto::DropReason::link_lost;
   const auto lose = [&](const Run& run, proto::DropReason reason) {
     lost += run.frames;
-    if (reason == proto::DropReason::link_unsure) may_have_arrived += run.frames;
     state_.drops.drop_mixed(run.bytes, run.size, reason);
   };
   if (connection.resume) {
+    // The other end may have taken them: a program may have done what they ask for before it ended.
+    constexpr auto kUnsure = proto::DropReason::link_unsure;
     const std::uint64_t let_go =
-        connection.resume->kept.clear([&](const Run& run) { lose(run, unsure); });
-    state_.tally.drop(unsure, let_go);
+        connection.resume->kept.clear([&](const Run& run) { lose(run, kUnsure); });
+    state_.tally.drop(kUnsure, let_go);
     lost += let_go;
-    if (connection.is_link()) may_have_arrived += let_go;
   }
+  const std::uint64_t may_have_arrived = lost;
   if (partial.frames != 0) lose(partial, proto::DropReason::link_lost);
   connection.outbox.count_dropped(lost);
   connection.outbox.counters()->unsure.add(may_have_arrived);

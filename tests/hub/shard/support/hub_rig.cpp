@@ -230,7 +230,7 @@ void HubRig::check_sessions(const Ledger& sums) const {
   }
   // Of these, only those for a session that is there, or that waited for it.
   const std::uint64_t perhaps = dropped(DropReason::away) + dropped(DropReason::no_subscriber) +
-                                dropped(DropReason::link_lost);
+                                dropped(DropReason::link_lost) + dropped(DropReason::link_unsure);
   EXPECT_GE(all.dropped, known);
   EXPECT_LE(all.dropped, known + perhaps);
 }
