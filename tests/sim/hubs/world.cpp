@@ -17,7 +17,6 @@ constexpr milliseconds kLookEvery{100};
 /// A clock of the hubs that never shows 0.
 constexpr milliseconds kBegin{1'000};
 constexpr std::int64_t kNsPerMs = 1'000'000;
-constexpr std::uint32_t kIdsOfADisk = 4'096;
 
 }  // namespace
 
@@ -44,8 +43,11 @@ hub::HubState World::new_disk(std::uint64_t unique) {
   hub::HubState disk;
   std::memcpy(disk.unique_id.data(), &unique, sizeof unique);
   for (std::byte& each : disk.secret) each = static_cast<std::byte>(random_.below(256));
-  // Another place for each, or a stale id would hit somebody (hub/config/state_folder.cpp).
-  disk.node_mark = disk.group_mark = ++disks_ * kIdsOfADisk;
+  // A hub that lost its state takes a random place, and hardly ever one that it had before
+  // (hub/config/state_folder.cpp). Here it takes one behind all that any hub was granted.
+  for (const Machine& each : machines_)
+    disk.node_mark = std::max({disk.node_mark, each.disk.node_mark, each.disk.group_mark});
+  disk.group_mark = disk.node_mark += hub::IndexPool::kBlock;
   return disk;
 }
 

@@ -125,7 +125,6 @@ class World {
   std::vector<SimNode> operators_;  ///< one at each hub
   std::vector<std::shared_ptr<Line>> lines_;
   std::uint64_t lines_begun_ = 0;
-  std::uint32_t disks_ = 0;
   std::optional<milliseconds> copied_at_;  ///< when a hub was last taken for a copy
   bool faults_ = true;                     ///< they may come, and nodes speak by themselves
 };
