@@ -9,6 +9,7 @@ constexpr std::size_t kChainHubs = 34;
 constexpr std::uint16_t kDrawnFrom = 1'024;
 constexpr std::int64_t kNow = 1'700'000'000'000'000'000;
 constexpr std::uint64_t kSharedNames = 4;
+constexpr std::uint64_t kSmallBudget = 8 << 20;
 
 enum class Shape : std::uint8_t { tree, chain, ring, star, mesh, pairs };
 constexpr std::size_t kMeshHubsMost = 6;
@@ -85,6 +86,7 @@ void draw_limits(Plan& plan, Random& random) {
   if (!random.chance(400)) return;
   plan.limits.lane1_bytes = lane;
   plan.limits.reserve_bytes = 4 * lane;
+  plan.limits.budget_bytes = kSmallBudget;
 }
 
 }  // namespace

@@ -36,6 +36,7 @@ struct NodePlan {
   std::size_t other = 0;  ///< where it goes when it moves; `hub`: it stays
   std::string name;
   std::uint32_t reads_per_ms = 0;  ///< bytes; 0: all that came
+  bool heeds_pause = true;
   [[nodiscard]] bool moves() const { return other != hub; }
 };
 

@@ -4,15 +4,12 @@
 #include <string>
 #include <vector>
 
+#include "tests/sim/hubs/load_scenes.hpp"
 #include "tests/sim/hubs/scene_plans.hpp"
 #include "tests/sim/hubs/timed_scenes.hpp"
 
 namespace gimnet::sim::hubs {
 namespace {
-
-constexpr std::uint32_t kGigabit = 125'000;  ///< bytes a ms
-constexpr std::uint32_t kRingRate = 50;      ///< bytes a ms of each link of a ring that is full
-constexpr std::uint64_t kRingBytes = 2'000;  ///< of each frame there
 
 /// So many names at hubs 0 and 1, each at both.
 void same_names(Plan& plan, std::size_t names, std::size_t one, std::size_t other) {
@@ -22,31 +19,12 @@ void same_names(Plan& plan, std::size_t names, std::size_t one, std::size_t othe
   }
 }
 
-/// Each node sends as much as it may, so many bytes a ms at most, to the node with that number.
-void flood(Stage& stage, std::uint64_t ms, std::uint64_t bytes, auto&& target_of) {
-  for (std::uint64_t i = 0; i < ms; ++i) {
-    for (std::size_t from = 0; from < stage.nodes(); ++from) {
-      const std::size_t to = target_of(from);
-      if (to == from || !stage.node(from).is_up() || !stage.node(to).is_up()) continue;
-      if (stage.node(from).is_blocked()) continue;
-      static_cast<void>(stage.node(from).send_to(stage.node(to).id(), bytes));
-    }
-    stage.run(1);
-  }
-}
-
-void all_arrive(Stage& stage, std::uint64_t within_ms) {
-  for (std::uint64_t ms = 0; ms < within_ms && stage.arrived() != stage.sent(); ms += 10)
-    stage.run(10);
-  Stage::need(stage.arrived() == stage.sent(), Checker::reachable, "a frame was lost");
-}
-
 // Sizes and ways
 
 void play_wan(Stage& stage) {
   stage.run(kStartMs);
   for (int i = 0; i < 3; ++i) {
-    flood(stage, 300, 200, [](std::size_t from) { return 1 - from; });
+    stage.flood(300, 200, [](std::size_t from) { return 1 - from; });
     stage.reset(0);
     stage.run(1'500);
   }
@@ -65,7 +43,7 @@ void play_modem(Stage& stage) {
   for (int i = 0; i < 2; ++i)
     Stage::need(stage.node(0).send_to(stage.node(1).id(), 65'000).has_value(), Checker::resumes,
                 "a node may not send");
-  all_arrive(stage, 150'000);
+  stage.all_arrive(150'000);
   Stage::need(stage.line_of(0) == line, Checker::joined, "the link broke");
 }
 
@@ -107,10 +85,10 @@ Plan plan_block_loop() {
 void play_block_loop(Stage& stage) {
   const auto to_last = [](std::size_t) { return std::size_t{2}; };
   stage.run(kStartMs);
-  flood(stage, 200, 5'000, to_last);
+  stage.flood(200, 5'000, to_last);
   stage.cut(1);
   stage.cut(2);
-  flood(stage, 2'500, 5'000, to_last);
+  stage.flood(2'500, 5'000, to_last);
 }
 
 void play_costs(Stage& stage) {
@@ -118,19 +96,19 @@ void play_costs(Stage& stage) {
   for (int i = 0; i < 6; ++i) {
     stage.cut(0, true, false);
     stage.set_cost(0, i % 2 == 0 ? 30 : 1);
-    flood(stage, 500, 100, [](std::size_t from) { return (from + 2) % 4; });
+    stage.flood(500, 100, [](std::size_t from) { return (from + 2) % 4; });
     stage.mend(0);
-    flood(stage, 300, 100, [](std::size_t from) { return (from + 2) % 4; });
+    stage.flood(300, 100, [](std::size_t from) { return (from + 2) % 4; });
   }
 }
 
 void play_unknown_flag(Stage& stage) {
   const auto across = [](std::size_t from) { return 2 - from; };
   stage.run(kStartMs);
-  flood(stage, 20, 100, across);
+  stage.flood(20, 100, across);
   const std::uint64_t line = stage.line_of(0);
   stage.spoil_next(0);
-  flood(stage, 500, 100, across);
+  stage.flood(500, 100, across);
   stage.run(100);
   Stage::need(stage.arrived() + 1 == stage.sent(), Checker::reachable, "not one frame is missing");
   Stage::need(stage.line_of(0) == line, Checker::joined, "the link broke");
@@ -245,79 +223,6 @@ void play_halves(Stage& stage) {
   stage.check_names();
 }
 
-// Load
-
-void play_broadcasts(Stage& stage) {
-  constexpr std::size_t kTimes = 3;
-  stage.run(2 * kStartMs);
-  for (std::size_t i = 0; i < kTimes; ++i) {
-    for (std::size_t from = 0; from < stage.nodes(); ++from)
-      stage.node(from).broadcast(from * kTimes + i);
-    stage.run(20);
-  }
-  stage.run(500);
-  for (std::size_t to = 0; to < stage.nodes(); ++to) {
-    std::vector<std::uint64_t> heard = stage.node(to).broadcasts();
-    std::ranges::sort(heard);
-    Stage::need(std::ranges::adjacent_find(heard) == heard.end(), Checker::right_node,
-                "a BROADCAST comes twice");
-    Stage::need(heard.size() == kTimes * (stage.nodes() - 1), Checker::reachable,
-                "a BROADCAST does not come to all");
-  }
-}
-
-Plan plan_broadcasts() {
-  Plan plan = star(66);
-  wire(plan, 1, 2);
-  wire(plan, 3, 4);
-  return plan;
-}
-
-/// Nodes 0 to 3 are one at each hub, 4 is the slow one at hub 0.
-Plan plan_slow_node() {
-  Plan plan = plan_of(4);
-  for (std::size_t i = 0; i < 4; ++i) {
-    if (i != 0) wire(plan, i, 0, 25, kGigabit);
-    node(plan, i);
-  }
-  node(plan, 0);
-  plan.nodes.back().reads_per_ms = 2'000;
-  for (std::size_t i = 1; i < 4; ++i) node(plan, i);
-  return plan;
-}
-
-void play_slow_node(Stage& stage) {
-  stage.run(kStartMs);
-  for (int i = 0; i < 300; ++i) {
-    flood(stage, 1, 30'000, [](std::size_t from) { return from < 1 || from > 3 ? from : 4; });
-    for (std::size_t other = 5; other < stage.nodes(); ++other) {
-      const auto sent = stage.node(other).send_to(stage.node(0).id(), 50);
-      Stage::need(sent.has_value(), Checker::resumes, "a bystander is paused");
-    }
-  }
-  Stage::need(stage.count(Event::paused_sender) >= 3, Checker::resumes, "nobody was paused");
-  all_arrive(stage, 60'000);
-}
-
-/// Each node sends to the one opposite. Two of the four links carry frames of their own node and of
-/// another one, which have to take turns.
-void play_block_ring(Stage& stage) {
-  // Longer than what lies in two full lanes takes.
-  constexpr std::uint64_t kLookMs = 60'000;
-  const std::uint64_t looks = stage.is_long() ? 60 : 5;
-  const auto opposite = [](std::size_t from) { return (from + 2) % 4; };
-  stage.run(kStartMs);
-  for (std::uint64_t look = 0; look < looks; ++look) {
-    std::vector<std::uint64_t> before;
-    for (std::size_t to = 0; to < stage.nodes(); ++to) before.push_back(stage.node(to).taken());
-    flood(stage, kLookMs, kRingBytes, opposite);
-    for (std::size_t to = 0; to < stage.nodes(); ++to)
-      Stage::need((stage.node(to).taken() - before[to]) * kRingBytes * 4 > kLookMs * kRingRate,
-                  Checker::resumes, "a sender does not get a quarter of its link");
-  }
-  all_arrive(stage, 60'000);
-}
-
 constexpr Scene kScenes[] = {
     {"star_of_200", [] { return star(200); },
      [](Stage& stage) { stage.run(kStartMs), stage.reset(7); }, true},
@@ -330,13 +235,10 @@ constexpr Scene kScenes[] = {
     {"costs_differ_at_the_ends", [] { return ring(4); }, play_costs},
     {"node_leaves_as_claims_meet", plan_leaving, play_leaving},
     {"clock_of_1970", plan_1970, play_1970},
-    {"66_sources_of_broadcast", plan_broadcasts, play_broadcasts},
     {"modem_of_1_kb", plan_modem, play_modem},
     {"unknown_flag", [] { return chain(3); }, play_unknown_flag},
     {"move_past_an_older_claim", plan_older_claim, play_older_claim},
     {"halves_with_100_names", plan_halves, play_halves},
-    {"three_block_to_a_slow_node", plan_slow_node, play_slow_node},
-    {"ring_of_four_with_block", [] { return ring(4, 5, kRingRate); }, play_block_ring},
 };
 
 }  // namespace
@@ -344,8 +246,8 @@ constexpr Scene kScenes[] = {
 std::span<const Scene> scenes() {
   static const std::vector<Scene> all = [] {
     std::vector<Scene> every(std::begin(kScenes), std::end(kScenes));
-    const std::span<const Scene> timed = timed_scenes();
-    every.insert(every.end(), timed.begin(), timed.end());
+    for (const std::span<const Scene> more : {load_scenes(), timed_scenes()})
+      every.insert(every.end(), more.begin(), more.end());
     return every;
   }();
   return all;

@@ -331,7 +331,7 @@ void SimNode::show(NodeId to, std::uint32_t bytes) {
 
 std::optional<std::uint64_t> SimNode::send(Kind kind, std::uint32_t dst, std::uint64_t session,
                                            std::uint64_t bytes, proto::Policy policy) {
-  if (paused_.contains({kind, Lane::normal, dst})) return std::nullopt;
+  if (plan_.heeds_pause && paused_.contains({kind, Lane::normal, dst})) return std::nullopt;
   const std::uint64_t number = around_.book.note_sent(at_, session);
   std::vector<std::byte> payload(static_cast<std::size_t>(bytes));
   store_le(payload.data(), number);

@@ -26,6 +26,11 @@ void Stage::set_cost(std::size_t wire, std::uint16_t cost) {
       proto::ctrl::SetLinkCost{World::link_of(wire).name, cost});
 }
 
+void Stage::all_arrive(std::uint64_t within_ms) {
+  for (std::uint64_t ms = 0; ms < within_ms && arrived() != sent(); ms += 10) run(10);
+  need(arrived() == sent(), Checker::reachable, "a frame was lost");
+}
+
 void Stage::check_names() {
   Settled settled(world_);
   settled.ask_names();

@@ -47,6 +47,24 @@ class Stage {
   }
   [[nodiscard]] std::uint64_t sent() const { return world_.book_.sent(); }
   [[nodiscard]] std::uint64_t arrived() const { return world_.book_.arrived(); }
+  [[nodiscard]] bool has_arrived(std::uint64_t number) const {
+    return world_.book_.has_arrived(number);
+  }
+  /// For so long each node sends as much as it may, a frame of so many bytes each ms at most, to
+  /// the node with that number.
+  void flood(std::uint64_t ms, std::uint64_t bytes, auto&& target_of) {
+    for (std::uint64_t i = 0; i < ms; ++i) {
+      for (std::size_t from = 0; from < nodes(); ++from) {
+        const std::size_t to = target_of(from);
+        if (to == from || !node(from).is_up() || !node(to).is_up()) continue;
+        if (node(from).is_blocked()) continue;
+        static_cast<void>(node(from).send_to(node(to).id(), bytes));
+      }
+      run(1);
+    }
+  }
+  /// Waits until all frames have come.
+  void all_arrive(std::uint64_t within_ms);
   /// Each name has one owner, and all hubs say so.
   void check_names();
   static void need(bool holds, Checker checker, const char* what) {

@@ -123,6 +123,14 @@ void World::step() {
   if (now_ % kLookEvery == milliseconds{0}) check_bounds();
 }
 
+/// Bytes of data that may wait for one node or link. BLOCK has half of the lane, and what comes
+/// until its senders heed PAUSE; the rest has the lane (docs/protocol.md, section 5).
+std::uint64_t World::most_waiting() const {
+  const hub::Limits& limits = plan_.limits;
+  return limits.lane1_bytes * 3 / 2 + limits.turn_bytes +
+         std::max(8 * limits.reserve_bytes, limits.budget_bytes / 8);
+}
+
 void World::check_bounds() {
   for (const Machine& machine : machines_) {
     if (machine.hub == nullptr) continue;
@@ -133,6 +141,9 @@ void World::check_bounds() {
         counters.delivered.value() + dropped + counters.queued.value())
       broken(Checker::ledgers,
              "the ledger of hub " + std::to_string(machine.plan.hub) + " is not exact");
+    for (const auto& connection : machine.hub->shard().connections)
+      if (connection != nullptr && connection->outbox.stale_bytes() > most_waiting())
+        broken(Checker::bounded, "more waits for a connection than may");
     // One for each unique id that a hub had, and for each link and its dialler's.
     const std::size_t records_most = machines_.size() + static_cast<std::size_t>(plan_.faults);
     const std::size_t links_most = 2 * wires_.size() * (1 + static_cast<std::size_t>(plan_.faults));

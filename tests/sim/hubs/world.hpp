@@ -68,6 +68,7 @@ class World {
   void run_until(milliseconds end);
   void step();
   void check_bounds();
+  [[nodiscard]] std::uint64_t most_waiting() const;
 
   // Hubs
   [[nodiscard]] hub::HubState new_disk(std::uint64_t unique);
