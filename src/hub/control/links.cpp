@@ -31,21 +31,12 @@ Links::Links(LinksOptions options, const Wiring& wiring)
 
 std::optional<Goodbye> Links::admit(Stranger& stranger, const proto::Hello& hello, Moment moment) {
   if (auto refused = handshake_.refusal(stranger, hello)) return refused;
-  if (links_.size() >= kLinksMax)
+  if (links_.all().size() >= kLinksMax)
     return Goodbye{GoodbyeCode::hub_full, "this hub has as many links as there can be"};
   if (auto refused = judge(*hello.introduction, moment)) return refused;
   proto::HubIntroduction said = *hello.introduction;
-  HubLink* link = nullptr;
-  for (const auto& [number, each] : links_) {
-    const bool same = !each->is_dialled() && each->peer() &&
-                      each->peer()->hub.unique == said.hub.unique && each->name() == said.link_name;
-    if (same) link = each.get();
-  }
-  if (link == nullptr) {
-    const LinkNumber number{++last_number_};
-    link = links_.emplace(number, std::make_unique<HubLink>(number, said.link_name))
-               .first->second.get();
-  }
+  HubLink* link = links_.find_accepted(said.hub.unique, said.link_name);
+  if (link == nullptr) link = &links_.add_accepted(said.link_name);
   link->address = stranger.peer.address;
   // Both ends go on with the counts that they have under that number, or both begin anew.
   if (said.counts == 0 || said.counts != totals_.number_of(link->number()))
@@ -68,7 +59,7 @@ std::optional<Goodbye> Links::judge(const proto::HubIntroduction& said, Moment m
     }
   }
   if (answer.admission != LinkAdmission::ask_old_link) return handshake_.refusal_of(said, answer);
-  HubLink* old = find(answer.old_link);
+  HubLink* old = links_.find(answer.old_link);
   if (old == nullptr) return std::nullopt;
   const HubLink::Alive alive = old->is_alive(moment.now);
   if (alive == HubLink::Alive::yes) answer.admission = LinkAdmission::is_copy;
@@ -94,7 +85,7 @@ void Links::dial_due(HubLink& link, Moment moment) {
 
 void Links::on_dialled(LinkNumber number, Result<net::Welcomed, net::NetError> outcome,
                        Moment moment) {
-  HubLink* link = find(number);
+  HubLink* link = links_.find(number);
   if (link == nullptr || link->connected() || draining_) return;
   const auto fail = [&](const std::string& sentence, bool copied) {
     if (link->last_error != sentence)
@@ -140,10 +131,7 @@ void Links::attach(HubLink& link, AttachCommand command, const proto::HubIntrodu
                    const LinkTerms& terms, Moment moment) {
   // Frames that wait are for hubs behind the former peer, and a shard knows a link by its hub.
   if (link.place && link.peer() && link.peer()->hub.hub != said.hub.hub) withdraw(link);
-  if (!link.place) {
-    link.place = wiring_.slots.take();
-    by_generation_[link.place->generation] = link.number();
-  }
+  if (!link.place) links_.give_place(link, wiring_.slots.take());
   wiring_.groups.set_place(link.number(), *link.place, said.hub.hub);
   link.begin_connection(said, terms, moment.now);
   link.last_error.clear();
@@ -176,7 +164,7 @@ void Links::begin_exchange(HubLink& link, Moment moment) {
 
 void Links::on_route(const SessionRef& session, std::uint32_t attachment,
                      std::span<const std::byte> payload, Moment moment) {
-  HubLink* link = find(session);
+  HubLink* link = links_.find(session);
   if (link == nullptr || !link->connected() || link->attachment != attachment) return;
   if (!link->exchange_begun) begin_exchange(*link, moment);
   const auto control = proto::split_control(payload);
@@ -209,7 +197,7 @@ void Links::on_route(const SessionRef& session, std::uint32_t attachment,
 }
 
 void Links::on_detached(const DetachedEvent& event, Moment moment) {
-  HubLink* link = find(event.session);
+  HubLink* link = links_.find(event.session);
   if (link == nullptr || !link->connected() || link->attachment != event.attachment) return;
   end_connection(*link, !link->note_detached(event), moment);
   advance(moment);
@@ -228,8 +216,7 @@ void Links::withdraw(HubLink& link) {
   wiring_.names.end_link(link.number());
   wiring_.groups.end_link(link.number());
   if (!link.place) return;
-  const Place place = *std::exchange(link.place, std::nullopt);
-  by_generation_.erase(place.generation);
+  const Place place = links_.take_place(link);
   totals_.release(link.number(), place.generation);
   // Shards stop to look the link up before it goes.
   publish_routes();
@@ -244,7 +231,7 @@ void Links::close(const HubLink& link, GoodbyeCode code, std::string sentence) {
 }
 
 void Links::tick(Moment moment) {
-  for (const auto& [number, link] : links_) {
+  for (const auto& [number, link] : links_.all()) {
     if (link->resume_until() && *link->resume_until() <= moment.now) withdraw(*link);
     if (link->damped_until() && *link->damped_until() <= moment.now) {
       link->end_damping();
@@ -256,19 +243,8 @@ void Links::tick(Moment moment) {
            proto::encode(link->say_keep_alive(network_.digest(), moment.now, moment.wall_ns)));
     }
   }
-  forget_ended(moment);
+  for (const LinkNumber number : links_.long_ended(moment.now)) forget(number);
   advance(moment);
-}
-
-void Links::forget_ended(Moment moment) {
-  std::vector<std::pair<milliseconds, LinkNumber>> ended;
-  for (const auto& [number, link] : links_)
-    if (link->is_over()) ended.emplace_back(link->over_since(moment.now), number);
-  std::ranges::sort(ended);
-  for (std::size_t i = 0; i < ended.size(); ++i) {
-    const auto& [since, number] = ended[i];
-    if (ended.size() - i > kEndedMost || since + HubLink::kEndedShown <= moment.now) forget(number);
-  }
 }
 
 std::optional<milliseconds> Links::next_deadline() const {
@@ -277,7 +253,7 @@ std::optional<milliseconds> Links::next_deadline() const {
     if (time && (!due || *time < *due)) due = time;
   };
   note(wiring_.names.next_due());
-  for (const auto& [number, link] : links_) {
+  for (const auto& [number, link] : links_.all()) {
     note(link->resume_until());
     note(link->damped_until());
     if (!draining_) note(link->dial_at());
@@ -291,7 +267,7 @@ void Links::advance(Moment moment) {
   network_.advance(moment.now);
   send_all(network_.take_sendings());
   if (const auto crowding = network_.take_crowding()) {
-    if (const HubLink* link = find(*crowding)) link->warn_of_crowding();
+    if (const HubLink* link = links_.find(*crowding)) link->warn_of_crowding();
   }
   publish_routes();
   if (map_seen_ != network_.maps()) {
@@ -307,7 +283,7 @@ void Links::advance(Moment moment) {
 
 void Links::send_all(std::span<const Sending> sendings) {
   for (const Sending& sending : sendings) {
-    const HubLink* link = find(sending.link);
+    const HubLink* link = links_.find(sending.link);
     if (link != nullptr && link->connected()) send(*link, proto::Kind::route, *sending.bytes);
   }
 }
@@ -317,11 +293,11 @@ void Links::leave_network(Verdict verdict, Moment moment) {
   const bool copied = verdict == Verdict::copied;
   const std::string sentence =
       copied ? "another machine runs a copy of this state folder; delete it on one of them"
-             : handshake_.taken_sentence(find(network_.map().own_id_holder()->link));
+             : handshake_.taken_sentence(links_.find(network_.map().own_id_holder()->link));
   log_line(LogLevel::error, {"left", "network"}, "left the network: " + sentence);
   if (!copied && may_give_way(moment.now)) draw_again();
   network_.leave();
-  for (const auto& [number, link] : links_) {
+  for (const auto& [number, link] : links_.all()) {
     if (!link->place) continue;
     close(*link, copied ? GoodbyeCode::copied : GoodbyeCode::id_taken, sentence);
     if (link->connected()) link->end_connection(true, moment.now);
@@ -335,7 +311,7 @@ void Links::leave_network(Verdict verdict, Moment moment) {
 
 void Links::publish_routes() {
   next_hops_.publish(network_.map().next_hops(), [this](LinkNumber number, HubId to) {
-    const HubLink* link = find(number);
+    const HubLink* link = links_.find(number);
     if (link == nullptr || !link->place) return NextHop{};
     return NextHop{{link->place->shard, link->place->slot, link->place->generation},
                    link->peer()->hub.hub,
@@ -350,18 +326,15 @@ void Links::send(const HubLink& link, proto::Kind kind, std::span<const std::byt
 }
 
 std::string Links::add(const DialledLink& link) {
-  if (const HubLink* known = find(link.name); known != nullptr && known->is_dialled())
+  if (const HubLink* known = links_.find(link.name); known != nullptr && known->is_dialled())
     return "there is a link '" + link.name + "' already; give another name";
-  if (links_.size() >= kLinksMax) return "this hub has as many links as there can be";
-  const LinkNumber number{++last_number_};
-  auto added = std::make_unique<HubLink>(number, link);
-  added->dial_after(milliseconds{0}, milliseconds{0});
-  links_.emplace(number, std::move(added));
+  if (links_.all().size() >= kLinksMax) return "this hub has as many links as there can be";
+  links_.add(link).dial_after(milliseconds{0}, milliseconds{0});
   return {};
 }
 
 std::string Links::remove(std::string_view name) {
-  HubLink* const link = find(name);
+  HubLink* const link = links_.find(name);
   if (link == nullptr) return "there is no link '" + std::string{name} + "'; see gimnet links";
   if (!link->is_dialled()) return "the other side dials that link; remove it there";
   close(*link, GoodbyeCode::done, "an administrator of the other hub removed the link");
@@ -371,23 +344,12 @@ std::string Links::remove(std::string_view name) {
 }
 
 std::string Links::set_cost(std::string_view name, std::uint16_t cost) {
-  HubLink* const link = find(name);
+  HubLink* const link = links_.find(name);
   if (link == nullptr) return "there is no link '" + std::string{name} + "'; see gimnet links";
   if (!link->is_dialled()) return "the other side dials that link; set its cost there";
   link->fix_cost(cost);
   network_.set_cost(link->number(), link->cost());
   return {};
-}
-
-/// Dialled links go first: the other side chose the names of accepted ones.
-HubLink* Links::find(std::string_view name) {
-  HubLink* accepted = nullptr;
-  for (const auto& [number, link] : links_) {
-    if (link->name() != name) continue;
-    if (link->is_dialled()) return link.get();
-    accepted = link.get();
-  }
-  return accepted;
 }
 
 }  // namespace gimnet::hub

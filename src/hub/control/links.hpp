@@ -3,8 +3,6 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
-#include <map>
-#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -17,6 +15,7 @@
 #include "hub/control/hub_facts.hpp"
 #include "hub/control/hub_link.hpp"
 #include "hub/control/link_handshake.hpp"
+#include "hub/control/link_roster.hpp"
 #include "hub/control/link_totals.hpp"
 #include "hub/control/network_names.hpp"
 #include "hub/control/next_hops.hpp"
@@ -35,8 +34,6 @@ namespace gimnet::hub {
 class Links {
  public:
   static constexpr std::size_t kLinksMax = 4'093;
-  /// Of links that the other side gave up the latest are shown.
-  static constexpr std::size_t kEndedMost = 64;
   /// A hub that began anew gives way to no other hub before: whoever may link could end it at will.
   static constexpr std::chrono::milliseconds kRedrawPause = std::chrono::minutes(1);
 
@@ -93,7 +90,7 @@ class Links {
   /// Says what is due, and publishes what follows from it.
   void advance(Moment moment);
 
-  [[nodiscard]] const std::map<LinkNumber, std::unique_ptr<HubLink>>& all() const { return links_; }
+  [[nodiscard]] const LinkRoster::All& all() const { return links_.all(); }
   // As in NetworkView.
   [[nodiscard]] std::string add(const DialledLink& link);
   [[nodiscard]] std::string remove(std::string_view name);
@@ -110,10 +107,9 @@ class Links {
   void end_connection(HubLink& link, bool at_once, Moment moment);
   /// Its routes go, and what waits for it is lost.
   void withdraw(HubLink& link);
-  void forget_ended(Moment moment);
   void forget(LinkNumber number) {
     totals_.forget(number);
-    links_.erase(number);
+    links_.forget(number);
   }
   void close(const HubLink& link, proto::GoodbyeCode code, std::string sentence);
   void send_all(std::span<const Sending> sendings);
@@ -128,15 +124,6 @@ class Links {
   void leave_network(Verdict verdict, Moment moment);
   void publish_routes();
   void send(const HubLink& link, proto::Kind kind, std::span<const std::byte> payload);
-  [[nodiscard]] HubLink* find(LinkNumber number) {
-    const auto found = links_.find(number);
-    return found == links_.end() ? nullptr : found->second.get();
-  }
-  [[nodiscard]] HubLink* find(const SessionRef& session) {
-    const auto found = by_generation_.find(session.generation);
-    return found == by_generation_.end() ? nullptr : find(found->second);
-  }
-  [[nodiscard]] HubLink* find(std::string_view name);
 
   const LinksOptions options_;
   const Wiring wiring_;
@@ -144,11 +131,9 @@ class Links {
   NetworkState network_;
   const LinkHandshake handshake_;  ///< of these
   std::uint64_t map_seen_ = 0;     ///< the map that the names were told of
-  std::map<LinkNumber, std::unique_ptr<HubLink>> links_;
-  std::map<std::uint32_t, LinkNumber> by_generation_;  ///< of those with a place
+  LinkRoster links_;
   LinkTotals totals_;
   std::uint64_t counts_begun_ = 0;  ///< as numbers of this instance; none of them is 0
-  std::uint32_t last_number_ = 0;
   bool draining_ = false;
   std::optional<HubId> redrawn_;
 };

@@ -310,11 +310,11 @@ TEST(Links, OfThoseThatEndedTheLatestAreShown) {
     hubs.a.detach(hubs.a.attached(), GoodbyeCode::done, true);
     hubs.a.pass(milliseconds{1});
   };
-  for (std::size_t number = 0; number < Links::kEndedMost + 2; ++number) begin_and_end(number);
-  ASSERT_THAT(hubs.a.links.all(), ::testing::SizeIs(Links::kEndedMost));
+  for (std::size_t number = 0; number < LinkRoster::kEndedMost + 2; ++number) begin_and_end(number);
+  ASSERT_THAT(hubs.a.links.all(), ::testing::SizeIs(LinkRoster::kEndedMost));
   EXPECT_EQ(hubs.a.links.all().begin()->second->name(), "link2");
   begin_and_end(2);
-  EXPECT_THAT(hubs.a.links.all(), ::testing::SizeIs(Links::kEndedMost)) << "it came back";
+  EXPECT_THAT(hubs.a.links.all(), ::testing::SizeIs(LinkRoster::kEndedMost)) << "it came back";
 }
 
 /// Its only link.

@@ -134,7 +134,7 @@ void Settled::check_rest() {
     }
     const auto ended = std::ranges::count_if(
         machine.hub->links().all(), [](const auto& each) { return each.second->is_over(); });
-    if (ended > static_cast<std::ptrdiff_t>(hub::Links::kEndedMost))
+    if (ended > static_cast<std::ptrdiff_t>(hub::LinkRoster::kEndedMost))
       broken(Checker::bounded, "a hub keeps too many links that nobody dials");
     std::set<std::pair<std::string, std::array<std::uint8_t, 16>>> accepted;
     for (const auto& [number, link] : machine.hub->links().all()) {
