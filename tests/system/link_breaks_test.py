@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """A link breaks again and again while a node sends over it: the hub in the middle of three is killed, the network cuts or
-stalls the connection, a hub stands still. Each frame arrives once or is reported to its sender."""
+stalls the connection, a hub stands still. Each frame arrives once or is reported to its sender. A link is removed: each
+frame arrives if another way leads there."""
 
 import json
 import os
@@ -198,6 +199,37 @@ class Breaks(unittest.TestCase):
     def until_silent(self, hub, states=("dialling", "away")):
         """The link of the hub has no connection any more."""
         wait_until(lambda: self.link_of(hub)["state"] in states, "the end of a silent link")
+
+
+class Removed(unittest.TestCase):
+    def test_a_link_beside_another_one_is_removed_while_frames_flow_both_ways(self):
+        first = Hub(self, "--accept-links", *PATIENT, hub_id=1)
+        network = Process([GIMNET, "impair", "tcp://127.0.0.1:0", first.url, "--delay", "20ms"], stdin=subprocess.PIPE)
+        self.addCleanup(network.end)
+        wait_until(lambda: network.out.startswith(b"ready "), f"the network; it said: {network.err}")
+        far = network.out.decode().split()[1]
+        last = Hub(self, "--link", far, *PATIENT, hub_id=3)
+        administrator = f"unix:{last.socket_path}"
+        added = run_gimnet(administrator, "ctl", "link", "add", first.url, "--cost", "900")
+        self.assertEqual(added.code, 0, added.err)
+
+        def states():
+            return {link["name"]: link["state"] for link in json.loads(run_gimnet(last, "links", "--json").out)}
+        wait_until(lambda: states() == {far: "up", first.url: "standby"}, "both links")
+        ends = [Reader(Client(self, hub).join(name)) for hub, name in ((first, "A"), (last, "B"))]
+        streams = [Sender(here.client, there.client.id) for here, there in (ends, ends[::-1])]
+        for thread in ends + streams:
+            thread.start()
+        wait_until(lambda: all(len(end.numbers) > 50 for end in ends), "frames both ways")
+        removed = run_gimnet(administrator, "ctl", "link", "remove", far)
+        self.assertEqual(removed.code, 0, removed.err)
+        wait_until(lambda: states() == {first.url: "up"}, "the other link alone")
+        for stream in streams:
+            stream.stop()
+        for stream, end in zip(streams, ends[::-1]):
+            wait_until(lambda stream=stream, end=end: len(end.numbers) >= stream.sent, f"{stream.sent} frames")
+            self.assertEqual(sorted(end.numbers), list(range(stream.sent)))
+        self.assertEqual([end.reported for end in ends], [{}, {}])
 
 
 if __name__ == "__main__":

@@ -138,6 +138,7 @@ class HubLink {
   std::uint32_t attachment = 0;  ///< numbers its connections
   std::string address;           ///< of the other end
   std::string last_error;
+  bool removed = false;          ///< by an administrator: it goes once its connection ends
   bool exchange_begun = false;   ///< on this connection
   std::uint64_t epoch = 0;       ///< of this end; 0: the link cannot be resumed
   std::uint64_t said_epoch = 0;  ///< in the HELLO that is under way

@@ -15,6 +15,8 @@ using proto::Goodbye;
 using proto::GoodbyeCode;
 using std::chrono::milliseconds;
 
+constexpr const char* kRemoved = "an administrator of the other hub removed the link";
+
 }  // namespace
 
 Links::Links(LinksOptions options, const Wiring& wiring)
@@ -199,12 +201,19 @@ void Links::on_route(const SessionRef& session, std::uint32_t attachment,
 void Links::on_detached(const DetachedEvent& event, Moment moment) {
   HubLink* link = links_.find(event.session);
   if (link == nullptr || !link->connected() || link->attachment != event.attachment) return;
-  end_connection(*link, !link->note_detached(event), moment);
+  if (link->removed) {
+    log_line(LogLevel::info, {"link", link->name()},
+             "link " + link->name() + " to " + link->title() + ": removed by an administrator");
+    give_up(*link);
+  } else {
+    end_connection(*link, !link->note_detached(event), moment);
+  }
   advance(moment);
 }
 
 void Links::end_connection(HubLink& link, bool at_once, Moment moment) {
   link.end_connection(at_once, moment.now);
+  if (link.removed) return give_up(link);
   if (at_once) withdraw(link);
   if (link.is_dialled()) link.dial_again(wiring_.random(), moment.now);
 }
@@ -222,6 +231,11 @@ void Links::withdraw(HubLink& link) {
   publish_routes();
   wiring_.shards.send(place.shard, ReleaseCommand{ref_of(place)});
   wiring_.slots.give_back(place);
+}
+
+void Links::give_up(HubLink& link) {
+  withdraw(link);
+  forget(link.number());
 }
 
 void Links::close(const HubLink& link, GoodbyeCode code, std::string sentence) {
@@ -297,10 +311,15 @@ void Links::leave_network(Verdict verdict, Moment moment) {
   log_line(LogLevel::error, {"left", "network"}, "left the network: " + sentence);
   if (!copied && may_give_way(moment.now)) draw_again();
   network_.leave();
-  for (const auto& [number, link] : links_.all()) {
+  for (auto next = links_.all().begin(); next != links_.all().end();) {
+    HubLink* const link = next++->second.get();
     if (!link->place) continue;
     close(*link, copied ? GoodbyeCode::copied : GoodbyeCode::id_taken, sentence);
     if (link->connected()) link->end_connection(true, moment.now);
+    if (link->removed) {
+      give_up(*link);
+      continue;
+    }
     withdraw(*link);
     link->last_error = sentence;
     if (!link->is_dialled()) continue;
@@ -326,8 +345,11 @@ void Links::send(const HubLink& link, proto::Kind kind, std::span<const std::byt
 }
 
 std::string Links::add(const DialledLink& link) {
-  if (const HubLink* known = links_.find(link.name); known != nullptr && known->is_dialled())
-    return "there is a link '" + link.name + "' already; give another name";
+  if (HubLink* known = links_.find(link.name); known != nullptr && known->is_dialled()) {
+    if (!known->removed) return "there is a link '" + link.name + "' already; give another name";
+    close(*known, GoodbyeCode::done, kRemoved);
+    give_up(*known);
+  }
   if (links_.all().size() >= kLinksMax) return "this hub has as many links as there can be";
   links_.add(link).dial_after(milliseconds{0}, milliseconds{0});
   return {};
@@ -337,15 +359,25 @@ std::string Links::remove(std::string_view name) {
   HubLink* const link = links_.find(name);
   if (link == nullptr) return "there is no link '" + std::string{name} + "'; see gimnet links";
   if (!link->is_dialled()) return "the other side dials that link; remove it there";
-  close(*link, GoodbyeCode::done, "an administrator of the other hub removed the link");
-  withdraw(*link);
-  forget(link->number());
+  if (!link->connected()) {
+    give_up(*link);
+  } else if (!std::exchange(link->removed, true)) {
+    // Routes move to other links at both ends, and this one carries what is under way.
+    link->fix_cost(LinkCost::kMost);
+    network_.set_cost(link->number(), link->cost());
+    const auto round_trip = std::chrono::ceil<milliseconds>(link->clock().round_trip_least);
+    CloseCommand command{ref_of(*link->place), GoodbyeCode::done, kRemoved};
+    command.quiet_ms = static_cast<std::uint32_t>((kRemovalQuiet + 2 * round_trip).count());
+    command.most_ms = static_cast<std::uint32_t>(kRemovalMost.count());
+    wiring_.shards.send(link->place->shard, std::move(command));
+  }
   return {};
 }
 
 std::string Links::set_cost(std::string_view name, std::uint16_t cost) {
   HubLink* const link = links_.find(name);
-  if (link == nullptr) return "there is no link '" + std::string{name} + "'; see gimnet links";
+  if (link == nullptr || link->removed)
+    return "there is no link '" + std::string{name} + "'; see gimnet links";
   if (!link->is_dialled()) return "the other side dials that link; set its cost there";
   link->fix_cost(cost);
   network_.set_cost(link->number(), link->cost());

@@ -34,6 +34,10 @@ namespace gimnet::hub {
 class Links {
  public:
   static constexpr std::size_t kLinksMax = 4'093;
+  /// A link that is removed ends when nothing was under way on it for so long and two round trips:
+  /// both ends have computed other ways by then. Something always is where no other way leads.
+  static constexpr std::chrono::milliseconds kRemovalQuiet{250};
+  static constexpr std::chrono::milliseconds kRemovalMost{2'000};
   /// A hub that began anew gives way to no other hub before: whoever may link could end it at will.
   static constexpr std::chrono::milliseconds kRedrawPause = std::chrono::minutes(1);
 
@@ -107,6 +111,8 @@ class Links {
   void end_connection(HubLink& link, bool at_once, Moment moment);
   /// Its routes go, and what waits for it is lost.
   void withdraw(HubLink& link);
+  /// The same, and nobody dials it any more.
+  void give_up(HubLink& link);
   void forget(LinkNumber number) {
     totals_.forget(number);
     links_.forget(number);

@@ -146,6 +146,9 @@ struct CloseCommand {
   SessionRef session;
   proto::GoodbyeCode code{};
   std::string sentence;
+  /// Of a link: not before nothing was under way for so long, in either direction.
+  std::uint32_t quiet_ms = 0;
+  std::uint32_t most_ms = 0;  ///< but at the latest after this time; 0: at once
 };
 
 /// The session is over: what waits for it is dropped (`link_lost`), its slot is free for a later

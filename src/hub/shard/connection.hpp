@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "base/token_bucket.hpp"
@@ -105,6 +107,35 @@ struct ResumeState {
   bool confirm_due = false;             ///< it stands in ShardState::confirms
 };
 
+/// A link that closes once it has carried what is under way: nothing waits at this end, all was
+/// confirmed in both directions, and no further frame came for a while. Thread safety: one shard.
+/// Limits: CloseCommand::most_ms.
+class LinkEnding {
+ public:
+  /// Data frames of the link so far.
+  struct Carried {
+    std::uint64_t written = 0;
+    std::uint64_t taken = 0;
+    friend bool operator==(const Carried&, const Carried&) = default;
+  };
+
+  LinkEnding(CloseCommand close, std::uint64_t now_ms)
+      : close_(std::move(close)), latest_ms_(now_ms + close_.most_ms), quiet_since_ms_(now_ms) {}
+
+  [[nodiscard]] const CloseCommand& close() const { return close_; }
+  /// To be asked from time to time. `waits`: something is not written or not confirmed yet.
+  [[nodiscard]] bool is_due(bool waits, const Carried& carried, std::uint64_t now_ms) {
+    if (waits || carried != std::exchange(carried_, carried)) quiet_since_ms_ = now_ms;
+    return now_ms >= latest_ms_ || now_ms - quiet_since_ms_ >= close_.quiet_ms;
+  }
+
+ private:
+  const CloseCommand close_;
+  const std::uint64_t latest_ms_;
+  std::uint64_t quiet_since_ms_;
+  Carried carried_;
+};
+
 /// The hub at the other end of a link.
 struct LinkPeer {
   LinkRule rule;
@@ -112,6 +143,7 @@ struct LinkPeer {
   /// The clock of the hub there is ahead of this hub's by so much; nothing: not measured yet.
   std::optional<std::int64_t> clock_ahead_ns{};
   TokenBucket control{};  ///< frames for the conductor
+  std::optional<LinkEnding> ending{};
 };
 
 /// A bit set of shards: any of them.

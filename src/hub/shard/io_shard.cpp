@@ -267,7 +267,11 @@ void IoShard::execute(ShardCommand& command) {
                  [&](TellCommand& told) { tell(told); },
                  [&](const TellAgainCommand& told) { tell_again(told); },
                  [&](CloseCommand& close) {
-                   if (Connection* connection = state_.find(close.session)) {
+                   Connection* connection = state_.find(close.session);
+                   if (connection == nullptr) return;
+                   if (close.most_ms != 0 && connection->is_link()) {
+                     connection->link->ending.emplace(std::move(close), state_.now_ms);
+                   } else {
                      closer_.close(*connection, close.code, std::move(close.sentence));
                    }
                  },

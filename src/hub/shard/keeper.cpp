@@ -58,11 +58,15 @@ std::uint64_t Keeper::next_tick_at_ms() const {
   return next_tick_at_ms_;
 }
 
+bool Keeper::is_written(const Connection& connection) {
+  return connection.outbox.empty() && !connection.writer.in_frame() && !connection.confirm_due() &&
+         connection.transport->pending_out() == 0;
+}
+
 void Keeper::look_at(Connection& connection) {
   const Limits& limits = state_.limits;
-  const bool written = connection.outbox.empty() && !connection.writer.in_frame() &&
-                       !connection.confirm_due() && connection.transport->pending_out() == 0;
-  if (draining_ && (state_.now_ms >= drain_deadline_ms_ || (written && state_.nothing_follows))) {
+  if (draining_ &&
+      (state_.now_ms >= drain_deadline_ms_ || (state_.nothing_follows && is_written(connection)))) {
     return closer_.close(connection, proto::GoodbyeCode::draining,
                          "the hub ends, or begins anew under another hub id; dial again");
   }
@@ -116,6 +120,20 @@ std::uint64_t Keeper::silent_ms(const Connection& connection) const {
 void Keeper::look_at_link(Connection& connection) {
   if (connection.resume) send_confirm(state_, connection);
   flusher_.look_after(connection);
+  if (connection.link->ending) end_if_quiet(connection);
+}
+
+void Keeper::end_if_quiet(Connection& connection) {
+  bool waits = !is_written(connection);
+  LinkEnding::Carried carried;
+  if (const ResumeState* resume = connection.resume.get()) {
+    waits = waits || resume->kept.unconfirmed() != 0 || resume->taken != resume->taken_told;
+    carried = {resume->kept.written(), resume->taken};
+  }
+  LinkEnding& ending = *connection.link->ending;
+  if (!ending.is_due(waits, carried, state_.now_ms)) return;
+  const CloseCommand close = ending.close();
+  closer_.close(connection, close.code, close.sentence);
 }
 
 /// Written at once: ten thousand who are told at one tick would each take a piece of memory until

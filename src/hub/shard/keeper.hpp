@@ -36,6 +36,9 @@ class Keeper {
  private:
   void look_at(Connection& connection);
   void look_at_link(Connection& connection);
+  void end_if_quiet(Connection& connection);
+  /// Does nothing wait to be handed to the kernel?
+  [[nodiscard]] static bool is_written(const Connection& connection);
   [[nodiscard]] std::uint64_t silent_ms(const Connection& connection) const;
   /// This shard did nothing for so long: what is asked of the peer within a time began as much
   /// later.

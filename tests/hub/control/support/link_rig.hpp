@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <deque>
@@ -70,9 +71,18 @@ struct LinkRig {
     stranger.peer = PeerInfo{transport, "127.0.0.1:5000"};
     return links.admit(stranger, hello, moment());
   }
-  /// The last AttachCommand that a shard got.
-  [[nodiscard]] const AttachCommand& attached() const {
-    return *shards.all<AttachCommand>().back();
+  /// The last AttachCommand that a shard got, or one before it.
+  [[nodiscard]] const AttachCommand& attached(std::size_t before = 0) const {
+    const auto all = shards.all<AttachCommand>();
+    return *all[all.size() - 1 - std::min(before, all.size() - 1)];
+  }
+  /// So many connections were attached after that of `session`.
+  [[nodiscard]] std::size_t attached_after(const SessionRef& session) const {
+    const auto all = shards.all<AttachCommand>();
+    const auto found = std::find_if(all.rbegin(), all.rend(), [&](const AttachCommand* each) {
+      return each->session.generation == session.generation;
+    });
+    return static_cast<std::size_t>(found - all.rbegin());
   }
   /// The frames that shards were told to send since the last call.
   std::vector<SendControlCommand> take_frames() {
@@ -145,7 +155,7 @@ struct LinkedRigs {
   static bool carry(LinkRig& from, LinkRig& to) {
     const auto frames = from.take_frames();
     for (const SendControlCommand& command : frames) {
-      const AttachCommand& at = to.attached();
+      const AttachCommand& at = to.attached(from.attached_after(command.session));
       to.links.on_route(at.session, at.attachment,
                         std::span{command.frame}.subspan(proto::kHeaderSize), to.moment());
     }
