@@ -60,6 +60,7 @@ void NetworkState::begin_connection(LinkNumber number, LinkFacts facts,
   link.differs_since.reset();
   link.repair_pause = kRepairPauses.first;
   note_links();
+  map_changed_ = true;
   for (const PartRef& part : store_.all()) send(number, part);
   static const auto kMark =
       std::make_shared<const proto::Payload>(proto::encode(proto::route::RecordsEnd{}));
@@ -100,13 +101,13 @@ void NetworkState::take(LinkNumber from, const PartRef& part, std::chrono::milli
     crowding_ = from;
   }
   if (taken != RecordStore::Taken::newer) return;
-  map_changed_ = true;
+  if (store_.is_near(part->said.hub)) map_changed_ = true;
   flood(part, from);
 }
 
 void NetworkState::take_mark(LinkNumber number) {
   if (Link* link = find(number); link != nullptr && !link->has_mark)
-    link->has_mark = links_changed_ = true;
+    link->has_mark = links_changed_ = map_changed_ = true;
 }
 
 void NetworkState::take_digest(LinkNumber number, std::uint64_t digest,
@@ -130,14 +131,14 @@ void NetworkState::set_cost(LinkNumber number, std::uint16_t cost) {
   Link* link = find(number);
   if (link == nullptr || link->facts.cost == cost) return;
   link->facts.cost = cost;
-  links_changed_ = true;
+  links_changed_ = map_changed_ = true;
 }
 
 void NetworkState::set_damped(LinkNumber number, bool damped) {
   Link* link = find(number);
   if (link == nullptr || link->damped == damped) return;
   link->damped = damped;
-  links_changed_ = true;
+  links_changed_ = map_changed_ = true;
 }
 
 void NetworkState::end_link(LinkNumber number) {
@@ -146,6 +147,7 @@ void NetworkState::end_link(LinkNumber number) {
   // Before the pause is over: frames under way go by another link, if there is one.
   map_ = NetworkMap(own_.identity(), store_, carrying_links());
   ++maps_;
+  reachable_changed_ = true;
 }
 
 void NetworkState::note_links() {
@@ -163,6 +165,7 @@ void NetworkState::leave() {
   own_.forget_copy();
   map_ = NetworkMap(own_.identity());
   ++maps_;
+  reachable_changed_ = true;
 }
 
 void NetworkState::renumber(HubId hub) {
@@ -191,13 +194,13 @@ void NetworkState::advance(std::chrono::milliseconds now) {
   }
   if (links_changed_) {
     links_changed_ = false;
-    map_changed_ = true;
     std::vector<proto::route::Neighbour> neighbours;
     for (const CarryingLink& each : carrying_links()) neighbours.push_back(each.neighbour);
     own_.set_neighbours(neighbours);
   }
   say_own(now);
   if (map_changed_ && now >= next_map_at_) compute_map(now);
+  if (std::exchange(reachable_changed_, false)) store_.set_reachable(map_.reachable(), now);
   if (now >= forget_pace_.next()) {
     forget_pace_.note_done(now);
     store_.forget(now);
@@ -208,7 +211,6 @@ void NetworkState::say_own(std::chrono::milliseconds now) {
   for (const PartRef& part : own_.take_due(now)) {
     store_.put_own(part);
     flood(part, LinkNumber{});
-    map_changed_ = true;
   }
 }
 
@@ -217,7 +219,7 @@ void NetworkState::compute_map(std::chrono::milliseconds now) {
   next_map_at_ = now + kMapPause * (1 + store_.bytes() / (1024 * 1024));
   map_ = NetworkMap(own_.identity(), store_, carrying_links());
   ++maps_;
-  store_.set_reachable(map_.reachable(), now);
+  reachable_changed_ = true;
 }
 
 std::optional<std::chrono::milliseconds> NetworkState::next_due() const {
@@ -226,7 +228,7 @@ std::optional<std::chrono::milliseconds> NetworkState::next_due() const {
     due = std::min(due.value_or(time), time);
   };
   if (map_changed_) note(next_map_at_);
-  if (links_changed_) note(std::chrono::milliseconds::min());
+  if (links_changed_ || reachable_changed_) note(std::chrono::milliseconds::min());
   for (const auto& [number, link] : links_) {
     if (const auto waits = link.pace.next_due()) note(*waits);
   }

@@ -214,8 +214,9 @@ class NetworkState {
   NetworkMap map_;
   std::uint64_t maps_ = 1;
   std::map<LinkNumber, Link> links_;
-  bool links_changed_ = false;
-  bool map_changed_ = false;
+  bool links_changed_ = false;      ///< the own record is to say so
+  bool map_changed_ = false;        ///< it is to be computed
+  bool reachable_changed_ = false;  ///< the store is to know
   std::chrono::milliseconds next_map_at_ = std::chrono::milliseconds::min();
   ChangePace forget_pace_{{kForgetPause, kForgetPause}};
   ChangePace crowded_pace_{{kCrowdedPause, kCrowdedPause}};

@@ -187,8 +187,13 @@ std::vector<PartRef> RecordStore::reachable() const {
 
 void RecordStore::set_reachable(std::span<const proto::HubKey> hubs,
                                 std::chrono::milliseconds now) {
+  named_.clear();
   for (auto& [hub, record] : records_) {
     if (std::ranges::binary_search(hubs, hub)) {
+      record.each_counting([&](const StoredPart& part) {
+        for (const auto& each : part.said.neighbours)
+          if (!std::ranges::binary_search(hubs, each.hub)) named_.push_back(each.hub);
+      });
       if (record.unreachable_since) unreachable_bytes_ -= record.bytes();
       record.unreachable_since.reset();
     } else if (!record.unreachable_since) {
@@ -196,6 +201,15 @@ void RecordStore::set_reachable(std::span<const proto::HubKey> hubs,
       record.unreachable_since = now;
     }
   }
+  std::ranges::sort(named_);
+  const auto [repeated, end] = std::ranges::unique(named_);
+  named_.erase(repeated, end);
+}
+
+bool RecordStore::is_near(const proto::HubKey& hub) const {
+  const StoredRecord* record = find(hub);
+  if (record != nullptr && !record->unreachable_since) return true;
+  return is_linked(hub) || std::ranges::binary_search(named_, hub);
 }
 
 void RecordStore::forget(std::chrono::milliseconds now) {

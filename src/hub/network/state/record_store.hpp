@@ -98,6 +98,9 @@ class RecordStore {
   void set_linked(std::vector<proto::HubKey> hubs) { linked_ = std::move(hubs); }
   /// These hubs can be reached, and no others. REQUIRES: ascending.
   void set_reachable(std::span<const proto::HubKey> hubs, std::chrono::milliseconds now);
+  /// May a record of that hub change which hubs can be reached, and how? It is reachable or linked,
+  /// or one that is reachable names it as a neighbour, as of the last set_reachable().
+  [[nodiscard]] bool is_near(const proto::HubKey& hub) const;
   void forget(std::chrono::milliseconds now);
 
   /// Of all records, with what it costs to keep each of them.
@@ -117,6 +120,7 @@ class RecordStore {
 
   Records records_;                    ///< Limit: kRecordsOfOneId for each hub id
   std::vector<proto::HubKey> linked_;  ///< ascending
+  std::vector<proto::HubKey> named_;   ///< by hubs that can be reached, which it cannot; ascending
   std::size_t bytes_ = 0;              ///< of all records
   std::size_t unreachable_bytes_ = 0;  ///< of those of hubs that cannot be reached
   std::uint64_t too_many_ = 0;

@@ -254,6 +254,7 @@ TEST_F(HubWithTwoLinks, ComputesMoreRarelyTheMoreRecordsThereAre) {
   for (std::uint16_t hub = 100; hub < 164; ++hub) neighbours.emplace_back(hub_key(hub), 10);
   for (std::uint16_t hub = 1'000; hub < 1'800; ++hub)
     hub_.take_record(kFirst, bytes(identity(hub, 7), 1, neighbours), later_);
+  hub_.set_cost(kFirst, 15);
   hub_.advance(later_);
   ASSERT_EQ(hub_.store().bytes() / (1024 * 1024), 1u);
   const std::uint64_t before = hub_.maps();
@@ -263,6 +264,31 @@ TEST_F(HubWithTwoLinks, ComputesMoreRarelyTheMoreRecordsThereAre) {
   EXPECT_EQ(hub_.next_due(), later_ + milliseconds(100));
   hub_.advance(later_ + milliseconds(100));
   EXPECT_EQ(hub_.maps(), before + 1);
+}
+
+TEST_F(HubWithTwoLinks, ComputesOnceWhenALinkEnds) {
+  const std::uint64_t before = hub_.maps();
+  hub_.end_link(kFirst);
+  hub_.advance(later_ + seconds(1));
+  EXPECT_EQ(hub_.maps(), before + 1);
+  EXPECT_TRUE(hub_.store().find(two_.key)->unreachable_since.has_value());
+}
+
+TEST_F(HubWithTwoLinks, ComputesNothingForAHubThatNoReachableOneNames) {
+  const std::uint64_t before = hub_.maps();
+  const auto nine = identity(9, 99);
+  const auto take = [&](LinkNumber link, const proto::Payload& record) {
+    hub_.take_record(link, record, later_);
+    hub_.advance(later_);
+    later_ += seconds(1);
+    return hub_.maps() - before;
+  };
+  EXPECT_EQ(take(kFirst, bytes(nine, 2, {{three_.key, 10}, {hub_key(5), 10}})), 0u);
+  EXPECT_EQ(sent(hub_), (Sent{{2, 9}})) << "others are told";
+  EXPECT_EQ(take(kFirst, bytes(two_, 2, {{hub_key(5), 10}, {nine.key, 10}})), 1u);
+  EXPECT_EQ(hub_.map().next_hops()[9], LinkNumber{}) << "it does not name hub 2 any more";
+  EXPECT_EQ(take(kFirst, bytes(nine, 3, {{two_.key, 10}})), 2u);
+  EXPECT_EQ(hub_.map().next_hops()[9], kFirst);
 }
 
 TEST_F(HubWithTwoLinks, CountsWhatIsNoRecord) {

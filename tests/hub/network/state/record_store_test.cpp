@@ -177,6 +177,21 @@ TEST(RecordStoreForget, ThrowsAwayHubsThatCouldNotBeReachedForTenMinutes) {
   EXPECT_NE(store.find(hub_key(1)), nullptr) << "the time begins when it is lost";
 }
 
+TEST(RecordStoreNear, AreHubsThatAReachableOneNames) {
+  RecordStore store;
+  store.set_linked({hub_key(4)});
+  store.take(part(identity(1, 7), 1, {{hub_key(2), 10}, {hub_key(3), 10}}), kNow);
+  store.take(part(identity(2, 7), 1, {{hub_key(1), 10}}), kNow);
+  store.take(part(identity(3, 7), 1, {{hub_key(5), 10}}), kNow);
+  EXPECT_FALSE(store.is_near(hub_key(1)));
+  store.set_reachable(std::vector{hub_key(1), hub_key(2)}, kNow);
+  EXPECT_TRUE(store.is_near(hub_key(1)));
+  EXPECT_TRUE(store.is_near(hub_key(2)));
+  EXPECT_TRUE(store.is_near(hub_key(3))) << "hub 1 names it";
+  EXPECT_TRUE(store.is_near(hub_key(4))) << "it is linked";
+  EXPECT_FALSE(store.is_near(hub_key(5))) << "hub 3 cannot be reached";
+}
+
 TEST(RecordDigest, IsThatOfTheDocument) {
   RecordStore store;
   const auto hub = identity(0x0102, 0x1112131415161718);
