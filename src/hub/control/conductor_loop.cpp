@@ -130,6 +130,7 @@ struct ConductorLoop::Impl {
       }
     });
     if (const auto hub = turns.take_overrun()) {
+      wiring.refusals.links_overrun.add(turns.take_dropped());
       const std::string name = std::to_string(hub->value());
       log_seldom(LogLevel::warning, {"overrun", name},
                  "link to hub " + name +

@@ -100,6 +100,7 @@ void for_each_counter(const RefusalCounters& counters, const Take& take) {
   take("refused.garbage", counters.garbage.value());
   take("refused.unfinished", counters.unfinished.value());
   take("refused.no_descriptor", counters.no_descriptor.value());
+  take("links.overrun", counters.links_overrun.value());
 }
 
 void for_each_counter(const RequestCounters& counters, const Take& take) {

@@ -46,6 +46,7 @@ void EventTurns::put(ShardEvent event) {
   const auto known = waiting_.find(key);
   if ((known == waiting_.end() ? 0 : known->second.link_bytes) + bytes > kLinkBytesMax) {
     overrun_ = hub_of(std::get<ControlFrameEvent>(event.what).node);
+    ++dropped_;
     return;
   }
   const auto [found, added] = waiting_.try_emplace(key);

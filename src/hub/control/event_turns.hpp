@@ -29,6 +29,8 @@ class EventTurns {
   void put(ShardEvent event);
   /// The hub of a link of which a frame was dropped since the last call.
   [[nodiscard]] std::optional<HubId> take_overrun() { return std::exchange(overrun_, {}); }
+  /// So many frames of links were dropped since the last call.
+  [[nodiscard]] std::uint64_t take_dropped() { return std::exchange(dropped_, 0); }
   [[nodiscard]] bool empty() const { return waiting_.empty() && drained_.empty(); }
   /// The next event of the node whose turn it is. DrainedEvent comes after all others. REQUIRES:
   /// not empty().
@@ -57,6 +59,7 @@ class EventTurns {
   std::vector<Key> ended_;       ///< with a DetachedEvent among their events, or not any more
   Events drained_;
   std::optional<HubId> overrun_;
+  std::uint64_t dropped_ = 0;
 };
 
 }  // namespace gimnet::hub

@@ -11,13 +11,15 @@
 
 namespace gimnet::hub {
 
-/// Peers that were turned away before they were admitted, by why.
+/// Peers that were turned away before they were admitted, by why, and frames of links that were not
+/// taken.
 /// Thread safety: written by the conductor's thread only, read by anybody.
 struct RefusalCounters {
   std::array<Counter, proto::kGoodbyeCount> by_code;  ///< told with GOODBYE
   Counter garbage;                                    ///< what they sent is not this protocol
   Counter unfinished;     ///< they ended in the middle of their opening or HELLO
   Counter no_descriptor;  ///< the hub had no descriptor to keep them
+  Counter links_overrun;  ///< frames of links: more waited for the conductor than may
 
   /// A code that is not listed is not counted.
   void count(proto::GoodbyeCode code) {

@@ -1,13 +1,37 @@
 #include "hub/shard/link_reader.hpp"
 
 #include "hub/shard/flow_words.hpp"
+#include "proto/control/route.hpp"
 #include "proto/frame/frame_parser.hpp"
 
 namespace gimnet::hub {
 namespace {
 
+using proto::route::RouteOperation;
+
 /// Frames for the conductor, of one link: the records of 4,000 hubs at once, and their changes.
 constexpr TokenBucket::Rate kControlFrames{5'000, 50'000};
+
+/// Of a ROUTE frame, after its header. The largest message has 10,240 bytes.
+constexpr std::uint32_t kRouteBytesMax = 16 * 1024;
+
+bool is_route(const proto::RunView& view) {
+  return proto::load_header(view.bytes).kind == proto::Kind::route;
+}
+
+bool is_too_large(const proto::RunView& view) {
+  return is_route(view) && view.size > proto::kHeaderSize + kRouteBytesMax;
+}
+
+/// A ROUTE frame of an operation that this version does not have.
+bool is_unknown(const proto::RunView& view) {
+  if (!is_route(view)) return false;
+  const auto control =
+      proto::split_control({view.bytes + proto::kHeaderSize, view.size - proto::kHeaderSize});
+  return !control ||
+         control->header.operation < static_cast<std::uint16_t>(RouteOperation::record) ||
+         control->header.operation > static_cast<std::uint16_t>(RouteOperation::joined);
+}
 
 bool is_counted(proto::Kind kind) {
   if (static_cast<std::uint8_t>(kind) >= proto::kFirstControlKind) return false;
@@ -33,8 +57,12 @@ bool LinkReader::take(Connection& connection, const proto::RunView& view, Admiss
       pass_on_flow(connection, view);
       return true;
     case Admission::control:
-      if (view.size == proto::kHeaderSize) break;  // it names no operation
-      take_control(connection, view);
+      if (view.size == proto::kHeaderSize || is_too_large(view)) break;
+      if (is_unknown(view)) {
+        state_.counters.malformed.add(1);
+      } else {
+        take_control(connection, view);
+      }
       return true;
     case Admission::report:
       pass_on_report(connection, view);

@@ -59,9 +59,13 @@ void Signals::send_control(NodeId node, std::span<const std::byte> frame) {
 
 void Signals::apply_control(NodeId node, std::span<const std::byte> frame) {
   Connection* connection = state_.find(node);
-  if (connection == nullptr || !connection->connected) return;
-  if (connection->outbox.push_control(frame, state_.egress))
+  const bool connected = connection != nullptr && connection->connected;
+  if (connected && connection->outbox.push_control(frame, state_.egress))
     return state_.recipients.mark_dirty(*connection);
+  const bool elsewhere = hub_of(node) != state_.shared.hub;
+  if (elsewhere && proto::load_header(frame.data()).kind == proto::Kind::report)
+    state_.counters.reports_lost.add(1);
+  if (!connected) return;
   // PAUSE is told again, a REPORT may be missed; RESUME is said once.
   if (is_resume(frame) && !connection->is_link()) connection->missed_resume = true;
 }

@@ -43,12 +43,14 @@ TEST(CounterNames, RefusalsAreListedByCode) {
   counters.count(static_cast<proto::GoodbyeCode>(proto::kGoodbyeCount));
   counters.garbage.add(2);
   counters.unfinished.add(3);
+  counters.links_overrun.add(4);
   const auto all = read(counters);
-  EXPECT_EQ(all.size(), proto::kGoodbyeCount + 3);
+  EXPECT_EQ(all.size(), proto::kGoodbyeCount + 4);
   EXPECT_EQ(all.at("refused.no_memory"), 1u);
   EXPECT_EQ(all.at("refused.garbage"), 2u);
   EXPECT_EQ(all.at("refused.unfinished"), 3u);
   EXPECT_EQ(all.at("refused.no_descriptor"), 0u);
+  EXPECT_EQ(all.at("links.overrun"), 4u);
   EXPECT_FALSE(all.contains("refused.unknown"));
 }
 

@@ -102,6 +102,8 @@ TEST_F(EventTurnsTest, ALinkThatSaysTooMuchLosesFramesAndKeepsItsEnd) {
   for (int i = 0; i < 1'000; ++i) say(proto::Kind::ns, 999, kSize);
   EXPECT_EQ(turns_.take_overrun(), HubId{9});
   EXPECT_FALSE(turns_.take_overrun());
+  EXPECT_EQ(turns_.take_dropped(), 1'000u);
+  EXPECT_EQ(turns_.take_dropped(), 0u);
   EXPECT_EQ(name(turns_.take()), "l1");
   say(proto::Kind::ns, 1'000, kSize);
   EXPECT_FALSE(turns_.take_overrun()) << "one was worked off";
