@@ -55,11 +55,13 @@ Core::~Core() { close(); }
 
 Outcome<std::shared_ptr<Core>> Core::join(const NodeOptions& options) {
   constexpr int kNumberMax = 99;
+  const std::int64_t deadline = deadline_after(options.timeout);
   auto joined = join_as(options);
   NodeOptions numbered = options;
   for (int number = 2; options.number_if_taken && joined.is(Status::name_taken); ++number) {
-    if (number > kNumberMax) break;
+    if (number > kNumberMax || is_over(deadline)) break;
     numbered.name = options.name + "-" + std::to_string(number);
+    numbered.timeout = Timeout{nif_timeout_until(deadline)};
     joined = join_as(numbered);
   }
   return joined;

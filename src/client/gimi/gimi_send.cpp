@@ -117,10 +117,11 @@ gimi_status gimi_sender_to_service(gimi_handle node, const char* full_name,
       // A request to it made that stream: its refusal comes from the hub's answer.
       if (stream != nullptr && found.core->requests().knows(full_name)) stream = nullptr;
       if (stream == nullptr) {
-        const Timeout timeout = timeout_of(timeout_ms);
-        const auto listed = listed_service(*found.core, full_name, timeout);
+        const std::int64_t deadline = deadline_after(timeout_of(timeout_ms));
+        const auto left = [deadline] { return Timeout{nif_timeout_until(deadline)}; };
+        const auto listed = listed_service(*found.core, full_name, left());
         if (!listed) return fail(listed.failure());
-        auto made = stream_to_service(*found.core, *listed, how, timeout);
+        auto made = stream_to_service(*found.core, *listed, how, left());
         if (!made) return fail(made.failure());
         stream = std::move(*made);
       }

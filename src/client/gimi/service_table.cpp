@@ -58,7 +58,8 @@ std::optional<Failure> ServiceTable::obstacle(const std::string& own_name,
 Outcome<PublishedService*> ServiceTable::advertise(const std::string& own_name,
                                                    const std::string& name,
                                                    const PublishOptions& options, Timeout timeout) {
-  const MutexLock turn(asking_);
+  const Turn turn(asking_, timeout);
+  if (!turn) return Turn::failure("advertise " + own_name + "/" + name);
   if (auto failure = obstacle(own_name, name)) return *failure;
   const Asking asking(*this, name);
   nif_service service = description_of(name, options.key, options.metadata);
@@ -69,7 +70,7 @@ Outcome<PublishedService*> ServiceTable::advertise(const std::string& own_name,
   std::uint32_t group = 0;
   std::uint32_t subscribers = 0;
   const nif_status status =
-      nif_advertise(uplink_.node(), &service, &group, &subscribers, nif_timeout(timeout));
+      nif_advertise(uplink_.node(), &service, &group, &subscribers, turn.left_ms());
   if (status != NIF_OK) return failure_of(status, "advertise " + own_name + "/" + name);
   auto published =
       std::make_unique<PublishedService>(uplink_, name, own_name + "/" + name, options);
@@ -85,20 +86,21 @@ Outcome<PublishedService*> ServiceTable::advertise(const std::string& own_name,
 
 Outcome<std::uint32_t> ServiceTable::accept(const std::string& own_name, const std::string& name,
                                             const AcceptOptions& options, Timeout timeout) {
-  const MutexLock turn(asking_);
+  const Turn turn(asking_, timeout);
+  if (!turn) return Turn::failure("accept " + own_name + "/" + name);
   if (auto failure = obstacle(own_name, name)) return *failure;
   nif_service service = description_of(name, options.key, options.metadata);
   service.direction = NIF_ACCEPTS;
   std::uint32_t group = 0;
   const nif_status status =
-      nif_advertise(uplink_.node(), &service, &group, nullptr, nif_timeout(timeout));
+      nif_advertise(uplink_.node(), &service, &group, nullptr, turn.left_ms());
   if (status != NIF_OK) return failure_of(status, "accept " + own_name + "/" + name);
   own_names_.insert(name);
   return group;
 }
 
 void ServiceTable::withdraw(PublishedService& service) {
-  const MutexLock turn(asking_);
+  const Turn turn(asking_, Turn::Leaving{});
   own_names_.erase(service.name());
   service.end({Status::closed, "the service was withdrawn"});
   {
@@ -108,13 +110,13 @@ void ServiceTable::withdraw(PublishedService& service) {
                   [&service](const auto& entry) { return entry.second == &service; });
   }
   // By name: NIF may know of a move that is not told here yet.
-  static_cast<void>(nif_withdraw_service(uplink_.node(), service.name().c_str(), kLeaveTimeoutMs));
+  static_cast<void>(nif_withdraw_service(uplink_.node(), service.name().c_str(), turn.left_ms()));
 }
 
 void ServiceTable::withdraw_accepted(const std::string& name) {
-  const MutexLock turn(asking_);
+  const Turn turn(asking_, Turn::Leaving{});
   own_names_.erase(name);
-  static_cast<void>(nif_withdraw_service(uplink_.node(), name.c_str(), kLeaveTimeoutMs));
+  static_cast<void>(nif_withdraw_service(uplink_.node(), name.c_str(), turn.left_ms()));
 }
 
 ServiceTable::Subscribed ServiceTable::entry(const std::string& full_name) {
@@ -150,12 +152,12 @@ void ServiceTable::forget_group(SubscribedService& service, std::uint32_t group)
     subscribed_by_group_.erase(place);
 }
 
-nif_status ServiceTable::ask(const Subscribed& service, Timeout timeout) {
+nif_status ServiceTable::ask(const Subscribed& service, std::int32_t timeout_ms) {
   nif_subscription found{};
   const Share share = service->share();
   const nif_pace wanted{sizeof wanted, share.window, share.depth, share.rate_hz};
-  const nif_status status = nif_subscribe_paced(uplink_.node(), service->name().c_str(), &wanted,
-                                                &found, nif_timeout(timeout));
+  const nif_status status =
+      nif_subscribe_paced(uplink_.node(), service->name().c_str(), &wanted, &found, timeout_ms);
   if (status != NIF_OK) return status;
   service->retained = found.retain != 0;
   const ServicePlace place{found.group,
@@ -176,27 +178,28 @@ nif_status ServiceTable::ask(const Subscribed& service, Timeout timeout) {
 
 Outcome<ServiceTable::Reading> ServiceTable::subscribe(const std::string& full_name,
                                                        const SubscribeOptions& wish) {
-  const MutexLock turn(asking_);
+  const Turn turn(asking_, wish.timeout);
+  if (!turn) return Turn::failure("subscribe " + full_name);
   const Asking asking(*this);
   const Subscribed service = entry(full_name);
   const bool is_first = !service->is_read();
   const Reading reading{service, service->add(wish)};
-  nif_status status = ask(service, wish.timeout);
+  nif_status status = ask(service, turn.left_ms());
   const bool ended = status == NIF_OK && !is_first && service->retained;
   if (ended) {
     // The hub gives the last message to who begins, and this subscriber does.
-    static_cast<void>(nif_unsubscribe(uplink_.node(), full_name.c_str(), kLeaveTimeoutMs));
-    status = ask(service, wish.timeout);
+    static_cast<void>(nif_unsubscribe(uplink_.node(), full_name.c_str(), turn.left_ms()));
+    status = ask(service, turn.left_ms());
   }
   if (status != NIF_OK) {
     auto failure = failure_of(status, "subscribe " + full_name);
     service->remove(*reading.subscriber);
     // As before: the hub does not know this one.
     if (ended) {
-      const nif_status again = ask(service, Timeout{kLeaveTimeoutMs});
+      const nif_status again = ask(service, kLeaveTimeoutMs);
       if (again != NIF_OK) service->on_refused(failure_of(again, "subscribe " + full_name));
     } else if (service->followed && is_first) {
-      static_cast<void>(ask(service, kNoWait));
+      static_cast<void>(ask(service, 0));
     }
     forget_unused(service);
     return failure;
@@ -204,16 +207,16 @@ Outcome<ServiceTable::Reading> ServiceTable::subscribe(const std::string& full_n
   // It may have been subscribed before, to know where it is or when it was another one.
   const char* const why = service->gives_none();
   if (why == nullptr) return reading;
-  leave(reading);
+  leave(reading, turn.left_ms());
   return Failure{Status::not_found, "cannot subscribe to '" + full_name + "': it " + why};
 }
 
 void ServiceTable::unsubscribe(const Reading& reading) {
-  const MutexLock turn(asking_);
-  leave(reading);
+  const Turn turn(asking_, Turn::Leaving{});
+  leave(reading, turn.left_ms());
 }
 
-void ServiceTable::leave(const Reading& reading) {
+void ServiceTable::leave(const Reading& reading, std::int32_t timeout_ms) {
   const Subscribed& service = reading.service;
   const Share before = service->share();
   service->remove(*reading.subscriber);
@@ -221,10 +224,10 @@ void ServiceTable::leave(const Reading& reading) {
   if (service->is_read() || service->followed) {
     if (service->share() == before) return;
     const Asking asking(*this);  // for what is told behind the answer
-    static_cast<void>(ask(service, Timeout{kLeaveTimeoutMs}));
+    static_cast<void>(ask(service, timeout_ms));
     return;
   }
-  static_cast<void>(nif_unsubscribe(uplink_.node(), service->name().c_str(), kLeaveTimeoutMs));
+  static_cast<void>(nif_unsubscribe(uplink_.node(), service->name().c_str(), timeout_ms));
   forget_unused(service);
 }
 
@@ -247,12 +250,13 @@ void ServiceTable::end_groups(SubscribedService& service) {
 
 Outcome<ServiceTable::Stream> ServiceTable::follow(const std::string& full_name, Timeout timeout,
                                                    const MakeStream& make) {
-  const MutexLock turn(asking_);
+  const Turn turn(asking_, timeout);
+  if (!turn) return Turn::failure("send to " + full_name);
   const Asking asking(*this);
   const Subscribed service = entry(full_name);
   // Also one that is read: what the hub told of it last may still be under way.
   if (!service->followed || service->is_refused()) {
-    const nif_status status = ask(service, timeout);
+    const nif_status status = ask(service, turn.left_ms());
     if (status != NIF_OK) {
       auto failure = failure_of(status, "send to " + full_name);
       forget_unused(service);
@@ -269,7 +273,7 @@ Outcome<ServiceTable::Stream> ServiceTable::follow(const std::string& full_name,
 }
 
 void ServiceTable::unfollow(const std::string& full_name, const std::function<bool()>& again) {
-  const MutexLock turn(asking_);
+  const Turn turn(asking_, Turn::Leaving{});
   if (again()) return;
   Subscribed service;
   {
@@ -281,7 +285,7 @@ void ServiceTable::unfollow(const std::string& full_name, const std::function<bo
   service->followed = false;
   if (service->is_read()) return;
   // If the hub is not told in time, NIF tells it with the next connection.
-  static_cast<void>(nif_unsubscribe(uplink_.node(), full_name.c_str(), kLeaveTimeoutMs));
+  static_cast<void>(nif_unsubscribe(uplink_.node(), full_name.c_str(), turn.left_ms()));
   forget_unused(service);
 }
 

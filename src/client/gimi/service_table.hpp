@@ -15,6 +15,7 @@
 #include "client/gimi/inbox.hpp"
 #include "client/gimi/send_stream.hpp"
 #include "client/gimi/services.hpp"
+#include "client/gimi/turns.hpp"
 #include "client/gimi/uplink.hpp"
 
 namespace gimnet::gimi {
@@ -31,7 +32,8 @@ class ServiceTable {
   ServiceTable(Uplink& uplink, Inbox& inbox, OnMoved on_moved)
       : uplink_(uplink), inbox_(inbox), on_moved_(std::move(on_moved)) {}
 
-  /// The calls of a program; they ask the hub, one after another.
+  /// The calls of a program; they ask the hub, one after another. The time that one waits for the
+  /// others counts.
   [[nodiscard]] Outcome<PublishedService*> advertise(const std::string& own_name,
                                                      const std::string& name,
                                                      const PublishOptions& options, Timeout timeout)
@@ -118,9 +120,10 @@ class ServiceTable {
   }
   [[nodiscard]] Subscribed entry(const std::string& full_name) GIMNET_EXCLUDES(mutex_);
   /// Asks the hub for what all subscribers want.
-  [[nodiscard]] nif_status ask(const Subscribed& service, Timeout timeout) GIMNET_REQUIRES(asking_)
+  [[nodiscard]] nif_status ask(const Subscribed& service, std::int32_t timeout_ms)
+      GIMNET_REQUIRES(asking_) GIMNET_EXCLUDES(mutex_);
+  void leave(const Reading& reading, std::int32_t timeout_ms) GIMNET_REQUIRES(asking_)
       GIMNET_EXCLUDES(mutex_);
-  void leave(const Reading& reading) GIMNET_REQUIRES(asking_) GIMNET_EXCLUDES(mutex_);
   /// Takes it out of the table, unless somebody reads it or sends there.
   void forget_unused(const Subscribed& service) GIMNET_REQUIRES(asking_) GIMNET_EXCLUDES(mutex_);
   void set_place(const Subscribed& subscribed, const ServicePlace& place) GIMNET_REQUIRES(mutex_);
@@ -131,7 +134,7 @@ class ServiceTable {
   Inbox& inbox_;
   const OnMoved on_moved_;
 
-  Mutex asking_;  ///< held while the hub is asked: its answers must be applied in the order of the
+  Turns asking_;  ///< taken while the hub is asked: its answers must be applied in the order of the
                   ///< questions
   std::set<std::string, std::less<>> own_names_
       GIMNET_GUARDED_BY(asking_);  ///< of services that are declared now
