@@ -1,10 +1,10 @@
 #include "client/gimi/open_requests.hpp"
 
 #include <algorithm>
+#include <memory>
 #include <utility>
 
 #include "base/clock.hpp"
-#include "base/endian.hpp"
 #include "client/gimi/loss_tally.hpp"
 #include "gimnet/gimi_options.h"
 #include "proto/frame/report.hpp"
@@ -98,8 +98,8 @@ Outcome<std::uint32_t> OpenRequests::open(const std::string& service, BytesView 
                    "cannot ask " + service + ": the request is larger than 1 GiB"};
   }
   // Before it is an open one: there may be no memory.
-  std::vector<std::byte> message(proto::gimi::kRequestPrefix + data.size());
-  std::ranges::copy(data.span(), message.begin() + proto::gimi::kRequestPrefix);
+  auto kept =
+      std::make_shared<const std::vector<std::byte>>(data.span().begin(), data.span().end());
   std::optional<Sending> sending;
   std::uint32_t number = 0;
   {
@@ -113,7 +113,7 @@ Outcome<std::uint32_t> OpenRequests::open(const std::string& service, BytesView 
     number = next_++;
     Open& made = open_[number];
     made.service = service;
-    made.message = std::move(message);
+    made.data = std::move(kept);
     made.lane = options.lane;
     made.repeat = options.repeat;
     made.deadline_ns = deadline_ns;
@@ -139,22 +139,22 @@ std::optional<OpenRequests::Sending> OpenRequests::prepare(std::uint32_t number,
     left_ms = static_cast<std::uint32_t>(
         std::min<std::int64_t>(left, proto::gimi::kNoDeadline - std::int64_t{1}));
   }
-  store_le(open.message.data(), left_ms);
   open.unsure |= std::exchange(open.sent, true);  // from the moment at which it is given away
   std::uint8_t flags = open.unsure ? proto::gimi::kFlagAgain : 0;
   if (open.repeat) flags |= proto::gimi::kFlagRepeat;
   open.provider = place.provider;
   open.session = place.session;
   open.again_ns = 0;
+  Envelope envelope{place.group, NIF_SERVICE, NIF_POLICY_DEFAULT, open.lane,
+                    place.key,   0,           NIF_FLAG_REPORT};
+  envelope.left_ms = left_ms;
   return Sending{
-      {place.group, NIF_SERVICE, NIF_POLICY_DEFAULT, open.lane, place.key, 0, NIF_FLAG_REPORT},
-      {number, proto::gimi::MessageOperation::request, flags, 0, epoch_},
-      open.message};
+      envelope, {number, proto::gimi::MessageOperation::request, flags, 0, epoch_}, open.data};
 }
 
 void OpenRequests::transmit(std::uint32_t number, const Sending& sending, std::int32_t timeout_ms) {
   const nif_status status =
-      uplink_.transmit(sending.envelope, sending.header, false, sending.message, timeout_ms);
+      uplink_.transmit(sending.envelope, sending.header, false, *sending.data, timeout_ms);
   if (status == NIF_OK) return;
   Failure failure = failure_of(status, "send a request");
   {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -99,9 +100,11 @@ class OpenRequests {
     ServicePlace place;
     std::uint64_t asked = 0;
   };
+  /// The bytes of a request, which goes without the lock while others look at it.
+  using Data = std::shared_ptr<const std::vector<std::byte>>;
   struct Open {
     std::string service;
-    std::vector<std::byte> message;  ///< with room for the time that is left
+    Data data;
     Lane lane = Lane::normal;
     bool repeat = false;
     std::int64_t deadline_ns = 0;
@@ -121,7 +124,7 @@ class OpenRequests {
   struct Sending {
     Envelope envelope;
     proto::gimi::MessageHeader header;
-    std::vector<std::byte> message;
+    Data data;
   };
   [[nodiscard]] std::optional<Sending> prepare(std::uint32_t number, Open& open,
                                                std::int64_t now_ns) GIMNET_REQUIRES(mutex_);

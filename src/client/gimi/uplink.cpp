@@ -2,9 +2,11 @@
 
 #include <array>
 #include <cstddef>
+#include <span>
 #include <utility>
 
 #include "base/clock.hpp"
+#include "base/endian.hpp"
 #include "base/random.hpp"
 #include "client/nif/api.hpp"
 #include "gimnet/gimi_options.h"
@@ -77,13 +79,16 @@ Failure failure_of(nif_status status, std::string_view doing) {
 
 nif_status Uplink::transmit(const Envelope& envelope, proto::gimi::MessageHeader header,
                             bool stamped, BytesView data, std::int32_t timeout_ms) const {
-  const bool is_request = header.operation == proto::gimi::MessageOperation::request;
-  const std::size_t own_bytes = is_request ? proto::gimi::kRequestPrefix : 0;
-  if (data.size() > GIMI_MESSAGE_BYTES_MAX + own_bytes)
+  if (data.size() > GIMI_MESSAGE_BYTES_MAX)
     return nif::fail(NIF_TOO_LARGE, "cannot send: the message is larger than 1 GiB");
-  std::array<std::byte, proto::gimi::kMessagePrefixMax> prefix;
+  std::array<std::byte, proto::gimi::kMessagePrefixMax + proto::gimi::kRequestPrefix> prefix;
   const auto stamp = stamped ? std::optional(wall_now_ns()) : std::nullopt;
-  const std::size_t prefix_size = proto::gimi::write_message_prefix(header, stamp, prefix);
+  std::size_t prefix_size = proto::gimi::write_message_prefix(
+      header, stamp, std::span(prefix).first<proto::gimi::kMessagePrefixMax>());
+  if (header.operation == proto::gimi::MessageOperation::request) {
+    store_le(prefix.data() + prefix_size, envelope.left_ms);
+    prefix_size += proto::gimi::kRequestPrefix;
+  }
   const std::array<nif_bytes, 2> parts{nif_bytes{prefix.data(), prefix_size},
                                        nif_bytes{data.data(), data.size()}};
   nif_outgoing outgoing = NIF_OUTGOING_INIT;

@@ -42,6 +42,7 @@ struct Envelope {
   std::uint32_t age_ms_max = 0;
   unsigned flags = 0;  ///< NIF_FLAG_*; KEYED is added
   std::uint8_t trace_slots = 0;
+  std::uint32_t left_ms = 0;  ///< of a request: goes before its data
 };
 
 /// Hubs of a way that a traced message tells of; as many as NIF allows.
