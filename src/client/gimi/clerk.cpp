@@ -114,7 +114,8 @@ void Clerk::attend(bool at_once) {
 
 net::Deadline Clerk::run() {
   const std::int64_t give_up_ns = give_up_ns_.load();
-  const bool idle = due_.empty() && paused_.empty() && give_up_ns == INT64_MAX;
+  const bool idle =
+      due_.empty() && paused_.empty() && give_up_ns == INT64_MAX && inbox_due_ns() == INT64_MAX;
   if (idle && !ticking_.load() && !hurry_.load() && tick_at_ns_ == INT64_MAX) return net::kNever;
   if (!due_.empty() || steady_now_ns() >= retry_at_ns_) send_due();
   const std::int64_t now = steady_now_ns();
@@ -125,12 +126,16 @@ net::Deadline Clerk::run() {
     done_.notify_all();
   }
   // Its own work may want a look at once.
-  return hurry_.load() ? now : std::min(tick_at_ns_, retry_at_ns_);
+  return hurry_.load() ? now : std::min({tick_at_ns_, retry_at_ns_, inbox_due_ns()});
+}
+
+std::int64_t Clerk::inbox_due_ns() const {
+  return inbox_ != nullptr ? inbox_->due_ns() : INT64_MAX;
 }
 
 void Clerk::tick(std::int64_t now_ns) {
   if (tick_at_ns_ == INT64_MAX && ticking_.load()) tick_at_ns_ = now_ns + kTickNs;
-  if (!hurry_.exchange(false) && now_ns < tick_at_ns_) return;
+  if (!hurry_.exchange(false) && now_ns < std::min(tick_at_ns_, inbox_due_ns())) return;
   ticking_.store(false);
   const bool streams = streams_.tick(now_ns);
   const bool requests = requests_ != nullptr && requests_->tick(now_ns);

@@ -107,6 +107,8 @@ class Clerk {
                                     std::uint32_t pong) const;
   /// Keeps in `paused_` what could not be sent because the hub has paused its way.
   void send_due();
+  /// A paced queue has to be looked at then.
+  [[nodiscard]] std::int64_t inbox_due_ns() const;
   /// Looks after the streams, requests and queues if it is time.
   void tick(std::int64_t now_ns);
 

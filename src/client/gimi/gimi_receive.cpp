@@ -169,7 +169,7 @@ gimi_status gimi_counts(gimi_handle source, gimi_queue_counts* counts) {
     std::uint64_t missed = 0;
     if (ref.kind() == HandleKind::subscription) {
       const ServiceTable::Reading& reading = static_cast<SubscriptionObject&>(found).reading;
-      missed = reading.service->missed(*reading.subscriber) + now.overwritten;
+      missed = reading.service->missed(*reading.subscriber) + now.overwritten + now.left_out;
     }
     nif::write_struct(gimi_queue_counts{sizeof(gimi_queue_counts), now.size, now.received,
                                         now.overwritten, missed},

@@ -44,10 +44,19 @@ MessageQueue& Inbox::add_queue(const QueueOptions& options, Timeout silence) {
   return queue;
 }
 
+void Inbox::pace(MessageQueue& queue, double rate_hz) {
+  const MutexLock lock(mutex_);
+  std::erase(paced_, &queue);
+  queue.pace(rate_hz == 0.0 ? 0 : static_cast<std::int64_t>(1e9 / rate_hz), steady_now_ns());
+  if (queue.is_paced()) paced_.push_back(&queue);
+}
+
 void Inbox::remove(MessageQueue& queue) {
   News news;
   {
     const MutexLock lock(mutex_);
+    std::erase(paced_, &queue);
+    queue.drop_held();
     static_cast<void>(queue.pop_newest());
     news = {refusing_ == &queue, false, queue.take_taken()};
     if (news.room) refusing_ = nullptr;
@@ -67,12 +76,35 @@ bool Inbox::push(MessageQueue& queue, Message& message, Receipt* receipt) {
     refusing_ = &queue;
     return false;
   }
+  if (queue.is_paced()) {
+    const std::int64_t now = steady_now_ns();
+    give_due(queue, now);
+    queue.hold(std::move(message));
+    give_due(queue, now);
+    set_due();
+  } else {
+    push_now(queue, std::move(message));
+  }
+  if (receipt != nullptr) receipt->on_kept();
+  return true;
+}
+
+void Inbox::push_now(MessageQueue& queue, Message message) {
   queue.push(std::move(message), ++arrivals_);
   recount(queue);
-  if (receipt != nullptr) receipt->on_kept();
   queue.filled().notify_one();
   if (any_waiters_ != 0) any_.notify_one();
-  return true;
+}
+
+void Inbox::give_due(MessageQueue& queue, std::int64_t now_ns) {
+  if (auto due = queue.take_due(now_ns)) push_now(queue, std::move(*due));
+}
+
+void Inbox::set_due() {
+  std::int64_t next = INT64_MAX;
+  for (const MessageQueue* queue : paced_) next = std::min(next, queue->due_ns());
+  // relaxed: see due_ns()
+  if (next < due_ns_.exchange(next, std::memory_order_relaxed) && missing_.begin) missing_.begin();
 }
 
 bool Inbox::put(MessageQueue& queue, Message& message, Receipt* receipt) {
@@ -187,6 +219,11 @@ bool Inbox::tick() {
   {
     const MutexLock lock(mutex_);
     more = look_at_silence() && !end_;
+    if (is_over(due_ns())) {
+      const std::int64_t now = steady_now_ns();
+      for (MessageQueue* queue : paced_) give_due(*queue, now);
+      set_due();
+    }
     // relaxed: see note_missed()
     if (missed_.load(std::memory_order_relaxed)) {
       tells = is_over(missed_due_ns_);
@@ -217,6 +254,10 @@ void Inbox::visit_any(const SourceVisitor& visitor) {
 }
 
 Inbox::News Inbox::news_of(MessageQueue& queue) {
+  if (queue.is_paced()) {
+    give_due(queue, steady_now_ns());  // it had no room
+    set_due();
+  }
   recount(queue);
   return {is_room_wanted(queue), !queue.empty(), queue.take_taken()};
 }
@@ -295,24 +336,12 @@ Outcome<Message> Inbox::receive_any(Timeout timeout) {
   return std::move(*message);
 }
 
-std::optional<Message> Inbox::try_receive(MessageQueue& queue) {
+std::optional<Message> Inbox::take(MessageQueue& queue, bool newest) {
   std::optional<Message> message;
   News news;
   {
     const MutexLock lock(mutex_);
-    message = queue.pop();
-    news = news_of(queue);
-  }
-  tell(news);
-  return message;
-}
-
-std::optional<Message> Inbox::take_newest(MessageQueue& queue) {
-  std::optional<Message> message;
-  News news;
-  {
-    const MutexLock lock(mutex_);
-    message = queue.pop_newest();
+    message = newest ? queue.pop_newest() : queue.pop();
     news = news_of(queue);
   }
   tell(news);
@@ -341,12 +370,13 @@ void Inbox::resize(MessageQueue& queue, std::size_t messages) {
 
 Inbox::Counts Inbox::counts(MessageQueue& queue) {
   const MutexLock lock(mutex_);
-  return {queue.size(), queue.received(), queue.overwritten()};
+  return {queue.size(), queue.received(), queue.overwritten(), queue.left_out()};
 }
 
 void Inbox::end(const Ending& ending) {
   const MutexLock lock(mutex_);
   end_ = ending;
+  for (MessageQueue* queue : paced_) give_due(*queue, INT64_MAX / 2);
   any_.notify_all();
   any_source_.update(true);
   for (MessageQueue& queue : queues_) {

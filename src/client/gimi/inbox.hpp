@@ -42,8 +42,8 @@ class Inbox {
 
   /// Called without a lock. `more`: others wait in the same queue.
   using OnTaken = std::function<void(const TakenMessages& taken, bool more)>;
-  /// Messages were missed: `begin` is called once, maybe with locks, as tick() has to be called;
-  /// then `tell` without a lock, from tick(), at most once a second.
+  /// `begin` is called, maybe with locks, as tick() has to be called: for a paced queue, or once
+  /// when messages were missed; then `tell` without a lock, from tick(), at most once a second.
   struct Missing {
     std::function<void()> begin;
     std::function<void()> tell;
@@ -63,6 +63,9 @@ class Inbox {
   /// A queue for a subscription, until remove(). `silence`: as in SubscribeOptions.
   MessageQueue& add_queue(const QueueOptions& options, Timeout silence = Timeout{0})
       GIMNET_EXCLUDES(mutex_);
+  /// At most so many messages a second come into a queue that add_queue() made, the newest at each
+  /// due time; 0: all that come.
+  void pace(MessageQueue& queue, double rate_hz) GIMNET_EXCLUDES(mutex_);
   /// Its messages count as taken. REQUIRES: add_queue() made it, and nobody uses it any more.
   void remove(MessageQueue& queue) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::size_t queues() GIMNET_EXCLUDES(mutex_);
@@ -87,9 +90,14 @@ class Inbox {
     // relaxed: the counts are read under their own locks
     if (missing_.begin && !missed_.exchange(true, std::memory_order_relaxed)) missing_.begin();
   }
-  /// Tells wait sets of queues that are silent, and what was missed. False: nothing is left to tell
-  /// at a later time.
+  /// Tells wait sets of queues that are silent, and what was missed; gives paced queues what is
+  /// due. False: nothing is left to tell at a later time.
   [[nodiscard]] bool tick() GIMNET_EXCLUDES(mutex_);
+  /// tick() has to be called then for a paced queue; INT64_MAX: for none.
+  [[nodiscard]] std::int64_t due_ns() const {
+    // relaxed: `begin` is called after each change, and what it does is seen with it
+    return due_ns_.load(std::memory_order_relaxed);
+  }
   void count_dropped() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::uint64_t dropped() GIMNET_EXCLUDES(mutex_);
 
@@ -101,8 +109,12 @@ class Inbox {
   /// Sets `left` and has those that receive with it leave.
   void leave(MessageQueue& queue, std::atomic<bool>& left) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] Outcome<Message> receive_any(Timeout timeout) GIMNET_EXCLUDES(mutex_);
-  [[nodiscard]] std::optional<Message> try_receive(MessageQueue& queue) GIMNET_EXCLUDES(mutex_);
-  [[nodiscard]] std::optional<Message> take_newest(MessageQueue& queue) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] std::optional<Message> try_receive(MessageQueue& queue) GIMNET_EXCLUDES(mutex_) {
+    return take(queue, false);
+  }
+  [[nodiscard]] std::optional<Message> take_newest(MessageQueue& queue) GIMNET_EXCLUDES(mutex_) {
+    return take(queue, true);
+  }
   void set(MessageQueue& queue, const QueueOptions& options) GIMNET_EXCLUDES(mutex_);
   void resize(MessageQueue& queue, std::size_t messages) GIMNET_EXCLUDES(mutex_);
 
@@ -110,6 +122,7 @@ class Inbox {
     std::size_t size = 0;
     std::uint64_t received = 0;
     std::uint64_t overwritten = 0;
+    std::uint64_t left_out = 0;  ///< of a paced queue, for newer ones
   };
   [[nodiscard]] Counts counts(MessageQueue& queue) GIMNET_EXCLUDES(mutex_);
 
@@ -117,8 +130,16 @@ class Inbox {
   void end(const Ending& ending) GIMNET_EXCLUDES(mutex_);
 
  private:
+  /// `newest`: the others count as taken.
+  [[nodiscard]] std::optional<Message> take(MessageQueue& queue, bool newest)
+      GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] bool push(MessageQueue& queue, Message& message, Receipt* receipt)
       GIMNET_REQUIRES(mutex_);
+  void push_now(MessageQueue& queue, Message message) GIMNET_REQUIRES(mutex_);
+  /// The message that a paced queue holds comes in, if it is due.
+  void give_due(MessageQueue& queue, std::int64_t now_ns) GIMNET_REQUIRES(mutex_);
+  /// Finds the next due time of all paced queues.
+  void set_due() GIMNET_REQUIRES(mutex_);
   [[nodiscard]] MessageQueue* first_waiting() GIMNET_REQUIRES(mutex_);
   /// After each change of what waits in a queue: it may have become empty, or is so no longer.
   void recount(MessageQueue& queue) GIMNET_REQUIRES(mutex_) {
@@ -147,6 +168,7 @@ class Inbox {
   const OnTaken on_taken_;
   const Missing missing_;
   std::atomic<bool> missed_{false};  ///< and not told yet
+  std::atomic<std::int64_t> due_ns_{INT64_MAX};
 
   Mutex mutex_;
   Condition any_;
@@ -157,6 +179,7 @@ class Inbox {
   std::map<MessageKey, MessageQueue*> by_key_ GIMNET_GUARDED_BY(mutex_);
   /// Those of keys for which nobody asked. Limit: kUnaskedKeysMax
   std::vector<MessageQueue*> unasked_ GIMNET_GUARDED_BY(mutex_);
+  std::vector<MessageQueue*> paced_ GIMNET_GUARDED_BY(mutex_);  ///< Limit: all that are there
   std::size_t any_waiters_ GIMNET_GUARDED_BY(mutex_) = 0;
   MessageQueue* refusing_ GIMNET_GUARDED_BY(mutex_) =
       nullptr;  ///< at most one: nothing comes while one refuses

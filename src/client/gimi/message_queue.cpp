@@ -17,9 +17,34 @@ void MessageQueue::set(const QueueOptions& options) {
   make_room(options_.messages);
 }
 
-bool MessageQueue::refuses() const {
+bool MessageQueue::is_full() const {
   if (options_.at_full != AtFullQueue::stop_reading || entries_.empty()) return false;
   return entries_.size() >= options_.messages || bytes_ >= bytes_max_;
+}
+
+void MessageQueue::pace(std::int64_t period_ns, std::int64_t now_ns) {
+  // The first of a paced one comes at once; otherwise the last one may just have come.
+  if (period_ns_ == 0 && received_ != 0) due_ns_ = now_ns + period_ns;
+  period_ns_ = period_ns;
+}
+
+void MessageQueue::hold(Message message) {
+  if (held_) ++left_out_;
+  drop_held();
+  held_ = std::move(message);
+}
+
+void MessageQueue::drop_held() {
+  if (held_) count_taken(*held_);
+  held_.reset();
+}
+
+std::optional<Message> MessageQueue::take_due(std::int64_t now_ns) {
+  if (now_ns < due_ns()) return std::nullopt;
+  // Due times keep their distance, whenever a thread looks at them.
+  const bool in_step = now_ns - due_ns_ < period_ns_;
+  due_ns_ = (in_step ? due_ns_ : now_ns) + period_ns_;
+  return std::exchange(held_, std::nullopt);
 }
 
 void MessageQueue::expect(Timeout silence) {

@@ -35,14 +35,29 @@ class MessageQueue {
   void set(const QueueOptions& options);
   void resize(std::size_t messages) { set({messages, options_.at_full}); }
 
-  /// It would refuse. A message fits into an empty queue, whatever its size.
-  [[nodiscard]] bool refuses() const;
+  /// It would refuse. A message fits into an empty queue, whatever its size. A paced one holds the
+  /// newest outside and refuses nothing.
+  [[nodiscard]] bool refuses() const { return !is_paced() && is_full(); }
   /// REQUIRES: !refuses(). `arrival` counts the messages of all queues of an Inbox.
   void push(Message message, std::uint64_t arrival);
   [[nodiscard]] std::optional<Message> pop();
   [[nodiscard]] std::optional<Message> pop_newest();
   /// The oldest one counts as overwritten. Returns its bytes. REQUIRES: !empty().
   std::size_t overwrite_oldest();
+
+  /// From now on one message comes in that time at most, the newest at each due time; 0: all.
+  void pace(std::int64_t period_ns, std::int64_t now_ns);
+  [[nodiscard]] bool is_paced() const { return period_ns_ != 0 || held_.has_value(); }
+  /// Keeps a message in place of one that is held.
+  void hold(Message message);
+  /// When the one that is held comes in; INT64_MAX: none is held, or there is no room.
+  [[nodiscard]] std::int64_t due_ns() const { return held_ && !is_full() ? due_ns_ : INT64_MAX; }
+  /// The one that is held, if any, counts as taken.
+  void drop_held();
+  /// The one that is held, if it is due: it comes in.
+  [[nodiscard]] std::optional<Message> take_due(std::int64_t now_ns);
+  /// Messages that were held and went for newer ones.
+  [[nodiscard]] std::uint64_t left_out() const { return left_out_; }
 
   /// Messages are expected at least once in that time; 0: they are not.
   void expect(Timeout silence);
@@ -72,6 +87,7 @@ class MessageQueue {
   bool counted = false;
 
  private:
+  [[nodiscard]] bool is_full() const;
   void make_room(std::size_t messages);
   void count_taken(const Message& message);
 
@@ -90,6 +106,10 @@ class MessageQueue {
   std::uint64_t overwritten_ = 0;
   Timeout silence_{0};
   std::int64_t silent_at_ns_ = INT64_MAX;
+  std::int64_t period_ns_ = 0;   ///< of a paced one
+  std::int64_t due_ns_ = 0;      ///< when the next message may come in
+  std::optional<Message> held_;  ///< until then
+  std::uint64_t left_out_ = 0;
   Condition filled_;
   WaitSource source_;
 };

@@ -210,6 +210,7 @@ SubscribedService::SharedSubscriber SubscribedService::add(const SubscribeOption
   auto subscriber = std::make_shared<Subscriber>(inbox_, wish, latest_);
   subscriber->missed_before = missed_;
   subscribers_.push_back(subscriber);
+  pace_queues();
   return subscriber;
 }
 
@@ -218,6 +219,7 @@ void SubscribedService::remove(const Subscriber& subscriber) {
   std::erase_if(subscribers_,
                 [&subscriber](const SharedSubscriber& each) { return each.get() == &subscriber; });
   if (subscribers_.empty()) last_ = counted_ = {};
+  pace_queues();
 }
 
 bool SubscribedService::is_read() {
@@ -227,6 +229,16 @@ bool SubscribedService::is_read() {
 
 Share SubscribedService::share() {
   const MutexLock lock(mutex_);
+  return widest_share();
+}
+
+void SubscribedService::pace_queues() {
+  const double of_hub = widest_share().rate_hz;
+  for (const SharedSubscriber& each : subscribers_)
+    inbox_.pace(each->queue, each->wish.rate_hz == of_hub ? 0.0 : each->wish.rate_hz);
+}
+
+Share SubscribedService::widest_share() const {
   std::optional<Share> widest;
   for (const SharedSubscriber& subscriber : subscribers_) {
     const Share one = subscriber->share();
@@ -253,16 +265,6 @@ std::uint64_t SubscribedService::missed_in_all() {
     if (each->wish.rate_hz == 0.0) sum += missed_ - each->missed_before;
   }
   return sum;
-}
-
-bool SubscribedService::exists() {
-  const MutexLock lock(mutex_);
-  return exists_;
-}
-
-bool SubscribedService::accepts() {
-  const MutexLock lock(mutex_);
-  return accepts_;
 }
 
 const char* SubscribedService::gives_none() {

@@ -156,9 +156,15 @@ class SubscribedService {
   // ---- where it is
 
   /// There is a provider.
-  [[nodiscard]] bool exists() GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] bool exists() GIMNET_EXCLUDES(mutex_) {
+    const MutexLock lock(mutex_);
+    return exists_;
+  }
   /// There is one who takes data under that name: nothing will come.
-  [[nodiscard]] bool accepts() GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] bool accepts() GIMNET_EXCLUDES(mutex_) {
+    const MutexLock lock(mutex_);
+    return accepts_;
+  }
   /// Null, or words for people: it takes data or questions instead.
   [[nodiscard]] const char* gives_none() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] Outcome<void> wait_until_exists(Timeout timeout) GIMNET_EXCLUDES(mutex_);
@@ -209,6 +215,10 @@ class SubscribedService {
   };
   [[nodiscard]] Stream* find(const Position& message) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] const char* reason() const GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] Share widest_share() const GIMNET_REQUIRES(mutex_);
+  /// The hub sends as much as the subscriber wants that wants most: the queues of those that want a
+  /// lower rate keep it themselves.
+  void pace_queues() GIMNET_REQUIRES(mutex_);
   /// One of its messages is about to be put into queues: whoever takes it knows what is missing
   /// before it.
   void count_missed(const Position& message) GIMNET_REQUIRES(mutex_);

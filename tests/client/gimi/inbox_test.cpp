@@ -53,6 +53,47 @@ TEST_F(InboxTest, SaysWhenTheTimeIsUp) {
   EXPECT_FALSE(inbox_.try_receive(inbox_.queue({1, 0}, nullptr)));
 }
 
+TEST(PacedQueue, GetsTheNewestAtEachDueTime) {
+  std::atomic<int> roused = 0;
+  Inbox inbox(2, 1000, [] {}, {}, {[&] { ++roused; }, [] {}});
+  MessageQueue& paced = inbox.add_queue({});
+  MessageQueue& plain = inbox.add_queue({});
+  const auto put = [&](std::uint32_t sequence) {
+    const std::array<MessageQueue*, 2> both{&paced, &plain};
+    Message message = make_message("x", sequence);
+    EXPECT_TRUE(inbox.put_in_all(both, message));
+  };
+  inbox.pace(paced, 50.0);
+  EXPECT_EQ(inbox.due_ns(), INT64_MAX);
+  put(1);
+  EXPECT_EQ(inbox.try_receive(paced)->sequence(), 1u) << "the first comes at once";
+  put(2);
+  put(3);
+  EXPECT_EQ(inbox.counts(plain).size, 3u);
+  EXPECT_EQ(inbox.counts(paced).left_out, 1u);
+  EXPECT_EQ(roused, 1);
+  while (!is_over(inbox.due_ns())) EXPECT_FALSE(inbox.try_receive(paced));
+  static_cast<void>(inbox.tick());
+  EXPECT_EQ(inbox.due_ns(), INT64_MAX);
+  EXPECT_EQ(inbox.receive(paced, kNoWait)->sequence(), 3u);
+  put(4);
+  inbox.end(Ending::closed());
+  EXPECT_EQ(inbox.receive(paced, kNoWait)->sequence(), 4u) << "what came is given out";
+}
+
+TEST(PacedQueue, EndsWithAMessage) {
+  Inbox inbox(2, 1000, [] {});
+  MessageQueue& paced = inbox.add_queue({});
+  inbox.pace(paced, 0.001);
+  for (std::uint32_t sequence = 1; sequence <= 3; ++sequence) {
+    Message message = make_message("x", sequence);
+    EXPECT_TRUE(inbox.put(paced, message, nullptr));
+  }
+  inbox.remove(paced);
+  EXPECT_EQ(inbox.queues(), 0u);
+  EXPECT_FALSE(inbox.tick());
+}
+
 TEST_F(InboxTest, WakesWhoWaits) {
   MessageQueue& queue = inbox_.queue({1, 0}, nullptr);
   std::uint32_t got = 0;

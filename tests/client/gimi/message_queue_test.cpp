@@ -44,6 +44,41 @@ TEST_F(MessageQueueTest, OfSizeOneHoldsTheNewest) {
   EXPECT_EQ(queue_.pop()->sequence(), 5u);
 }
 
+TEST_F(MessageQueueTest, HoldsTheNewestUntilItIsDue) {
+  queue_.pace(100, 5000);
+  EXPECT_EQ(queue_.due_ns(), INT64_MAX) << "nothing is held";
+  queue_.hold(make_message("x", 1));
+  EXPECT_EQ(queue_.take_due(5000)->sequence(), 1u) << "the first at once";
+  queue_.hold(make_counted(7, 1));
+  queue_.hold(make_message("x", 3));
+  EXPECT_EQ(queue_.left_out(), 1u);
+  EXPECT_EQ(queue_.take_taken().size(), 1u);
+  EXPECT_EQ(queue_.due_ns(), 5100);
+  EXPECT_FALSE(queue_.take_due(5099));
+  EXPECT_EQ(queue_.take_due(5130)->sequence(), 3u);
+  queue_.hold(make_message("x", 4));
+  EXPECT_EQ(queue_.due_ns(), 5200) << "due times keep their distance";
+  EXPECT_TRUE(queue_.take_due(9000));
+  queue_.hold(make_message("x", 5));
+  EXPECT_EQ(queue_.due_ns(), 9100);
+  queue_.pace(0, 9010);
+  EXPECT_TRUE(queue_.is_paced()) << "until what is held was due";
+  EXPECT_TRUE(queue_.take_due(9100));
+  EXPECT_FALSE(queue_.is_paced());
+}
+
+TEST_F(MessageQueueTest, OneThatIsPacedRefusesNothing) {
+  queue_.set({1, AtFullQueue::stop_reading});
+  queue_.push(make_message("x", 1), 1);
+  EXPECT_TRUE(queue_.refuses());
+  queue_.pace(100, 5000);
+  EXPECT_FALSE(queue_.refuses());
+  queue_.hold(make_message("x", 2));
+  EXPECT_FALSE(queue_.take_due(5100)) << "there is no room";
+  EXPECT_TRUE(queue_.pop());
+  EXPECT_TRUE(queue_.take_due(5100));
+}
+
 TEST_F(MessageQueueTest, ChangesItsSizeWhileItRuns) {
   for (std::uint32_t number = 1; number <= 3; ++number)
     queue_.push(make_message("x", number), number);

@@ -138,6 +138,35 @@ TEST_F(Wishes, OfAWindowOrADepthWorkWithEveryDelivery) {
   EXPECT_LE(newest.size(), 3u);
 }
 
+TEST_F(Wishes, OfARateWorkBesideASubscriptionWithoutOne) {
+  for (const Delivery delivery : {Delivery::stream, Delivery::latest, Delivery::sync}) {
+    offer(delivery, kWindow);
+    const Subscription every = subscribe({.queue = 100});
+    expect_newest_when_due();
+    EXPECT_EQ(take(every).back(), std::to_string(kMessages));
+  }
+}
+
+TEST_F(Wishes, OfTwoRatesAreBothKept) {
+  offer(Delivery::stream);
+  const Subscription often = subscribe({.rate_hz = 100.0, .queue = 100});
+  expect_newest_when_due();
+  EXPECT_THAT(take(often), ElementsAre("1", std::to_string(kMessages)));
+}
+
+TEST_F(Wishes, OfARateReachAWaitSet) {
+  offer(Delivery::stream);
+  const Subscription every = subscribe({});
+  const Subscription paced = subscribe({.rate_hz = kRate});
+  const WaitSet set;
+  set.add(paced, 7).or_throw();
+  publish_at_once();
+  EXPECT_THAT(set.wait(kWait).or_throw(), ElementsAre(7u));
+  EXPECT_EQ(paced.receive(kNoWait)->text(), "1");
+  EXPECT_THAT(set.wait(kWait).or_throw(), ElementsAre(7u));
+  EXPECT_EQ(paced.receive(kNoWait)->text(), std::to_string(kMessages));
+}
+
 TEST_F(Wishes, TellSilenceFromTheEnd) {
   offer(Delivery::stream);
   const Subscription subscription = subscribe({.silence = Timeout{20}});
