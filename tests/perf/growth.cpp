@@ -331,6 +331,8 @@ constexpr Script kScripts[] = {
     {"neighbours", neighbours},
     {"patterns", patterns},
     {"pattern_parts", pattern_parts},
+    {"queues", queues},
+    {"wait_set", wait_set},
 };
 
 int run(std::string_view argument) {

@@ -19,4 +19,10 @@ using Work = std::function<void()>;
 /// nodes, 800 a turn.
 [[nodiscard]] Work forwarding(std::size_t count);
 
+// Of the library.
+/// So many messages come into one queue and are taken out, beside as many other queues.
+[[nodiscard]] Work queues(std::size_t count);
+/// The same with all queues in a wait set, which tells of each message.
+[[nodiscard]] Work wait_set(std::size_t count);
+
 }  // namespace gimnet::hub

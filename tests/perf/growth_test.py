@@ -12,7 +12,8 @@ from driver import instructions  # noqa: E402
 
 # Script: few, many, and how many times more a piece may cost among many. Names are found in a tree: among a hundred times
 # as many they are seven comparisons deeper. Of parts of a pattern each is compared with each of the name, 16 x 16 at most.
-# A hub of 10 nodes and one of 10,000 forward to eight of them at the same cost.
+# A hub of 10 nodes and one of 10,000 forward to eight of them at the same cost. Taking from one queue costs the same beside
+# 10,000 others.
 SCRIPTS = {
     "forwarding": (800, 800_000, 1.02),
     "duplicate_keys": (1_000, 100_000, 1.2),
@@ -29,6 +30,8 @@ SCRIPTS = {
     "neighbours": (40, 1_000, 1.5),
     "patterns": (10, 1_000, 1.2),
     "pattern_parts": (2, 16, 16),
+    "queues": (100, 10_000, 1.02),
+    "wait_set": (100, 10_000, 1.02),
 }
 
 
