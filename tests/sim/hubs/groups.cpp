@@ -1,3 +1,5 @@
+#include <utility>
+
 #include "base/ids.hpp"
 #include "tests/sim/hubs/world.hpp"
 
@@ -9,12 +11,6 @@ namespace {
 constexpr std::size_t kServicesMost = 3;
 /// A subscription is answered after 1 s at the latest.
 constexpr std::uint64_t kAnswerMs = 1'200;
-
-struct Given {
-  SimNode* node;
-  GroupId group;
-  std::uint64_t last = 0;  ///< 0: none
-};
 
 std::uint64_t last_of(const std::vector<std::uint64_t>& heard) {
   return heard.empty() ? 0 : heard.back();
@@ -33,10 +29,6 @@ void Settled::check_groups() {
     if (all.size() == kServicesMost) break;
   }
   if (all.empty()) return;
-  const auto near = [this](const SimNode& person, const Given& each) {
-    const int links = distance_[person.plan().hub][each.node->at()];
-    return person.is_up() && links >= 0 && links <= proto::kHopsMax;
-  };
   // A hub that joined in time of faults, and then all.
   const auto check_parents = [&](bool all_joined) {
     for (const Given& each : all) {
@@ -58,7 +50,7 @@ void Settled::check_groups() {
     for (const Given& each : all) {
       for (SimNode& person : world_.operators_) {
         const std::uint64_t last = last_of(person.heard(each.group));
-        if (!near(person, each) || last == each.last) continue;
+        if (!is_near(person, each) || last == each.last) continue;
         broken(Checker::subscribers, std::string{when} + " of group " + to_string(each.group) +
                                          " at hub " + std::to_string(person.plan().hub) + " is " +
                                          std::to_string(last) + ", and not " +
@@ -69,7 +61,7 @@ void Settled::check_groups() {
   // One after the other: a hub on the way has joined when the next subscriber comes.
   for (SimNode& person : world_.operators_) {
     for (const Given& each : all)
-      if (near(person, each)) person.subscribe(each.node->name());
+      if (is_near(person, each)) person.subscribe(each.node->name());
     world_.run_until(world_.now() + milliseconds{20});
   }
   world_.run_until(world_.now() + way);
@@ -79,6 +71,33 @@ void Settled::check_groups() {
   world_.run_until(world_.now() + way);
   check("the next message");
   check_parents(true);
+  check_missed(all);
+}
+
+bool Settled::is_near(const SimNode& person, const Given& each) const {
+  const int links = distance_[person.plan().hub][each.node->at()];
+  return person.is_up() && links >= 0 && links <= proto::kHopsMax;
+}
+
+/// Each operator is the only one at its hub that says what it missed.
+void Settled::check_missed(const std::vector<Given>& all) {
+  for (SimNode& person : world_.operators_) {
+    for (const Given& each : all)
+      if (is_near(person, each)) person.say_missed(each.group, index_of(person.id()));
+    for (const Given& each : all)
+      if (is_near(person, each)) person.list_service(each.node->name());
+  }
+  world_.run_until(world_.now() + milliseconds{20});
+  for (const Given& each : all) {
+    for (SimNode& person : world_.operators_) {
+      const std::pair<std::uint64_t, NodeId> told{index_of(person.id()), person.id()};
+      if (is_near(person, each) && person.missed(each.group) != told)
+        broken(Checker::subscribers, "hub " + std::to_string(person.plan().hub) + " says that " +
+                                         std::to_string(person.missed(each.group).first) +
+                                         " messages of group " + to_string(each.group) +
+                                         " were missed, and not " + std::to_string(told.first));
+    }
+  }
 }
 
 }  // namespace gimnet::sim::hubs

@@ -163,6 +163,27 @@ void play_1970(Stage& stage) {
 
 // Names
 
+Plan plan_away() {
+  Plan plan = plan_of(2);
+  wire(plan, 0, 1);
+  same_names(plan, 1, 0, 1);
+  return plan;
+}
+
+/// The claim with the lower node id would win, were its node connected.
+void play_away(Stage& stage) {
+  stage.cut(0);
+  stage.run(kStartMs);
+  stage.node(0).lose_connection(stage.now(), 5'000);
+  stage.run(100);
+  stage.mend(0);
+  stage.run_until_up(0);
+  stage.run(2'000);
+  Stage::need(stage.node(1).name() == stage.node(1).plan().name, Checker::one_owner,
+              "a node lost its name to one that is away");
+  stage.check_names();
+}
+
 Plan plan_leaving() {
   Plan plan = chain(2);
   same_names(plan, 20, 0, 1);
@@ -234,6 +255,7 @@ constexpr Scene kScenes[] = {
     {"loop_of_two_with_block", plan_block_loop, play_block_loop},
     {"costs_differ_at_the_ends", [] { return ring(4); }, play_costs},
     {"node_leaves_as_claims_meet", plan_leaving, play_leaving},
+    {"held_goes_before_away", plan_away, play_away},
     {"clock_of_1970", plan_1970, play_1970},
     {"modem_of_1_kb", plan_modem, play_modem},
     {"unknown_flag", [] { return chain(3); }, play_unknown_flag},

@@ -118,6 +118,13 @@ void SimNode::crash(milliseconds now) {
   back_at_ = now + milliseconds{around_.random.between(1, 2'000)};
 }
 
+void SimNode::lose_connection(milliseconds now, std::uint64_t back_after_ms) {
+  pipe_.reset();
+  up_ = false;
+  last_ = "lost its connection at " + std::to_string(now.count());
+  back_at_ = now + milliseconds{back_after_ms};
+}
+
 void SimNode::read(milliseconds now) {
   const std::size_t most =
       plan_.reads_per_ms == 0 ? hub::MemoryPeer::kAll : std::size_t{plan_.reads_per_ms};
@@ -229,6 +236,10 @@ void SimNode::take_control(std::span<const std::byte> payload) {
     group_ = offered->group;
     return around_.book.note_group(offered->group, session_);
   }
+  if (const auto listed = proto::decode_answer<ns::ServicesAnswer>(payload)) {
+    for (const ns::ServiceRecord& each : listed->services)
+      missed_[each.group] = {each.missed, each.missed_most};
+  }
   if (name.empty()) return;
   const auto answer = proto::decode_answer<ns::ResolveAnswer>(payload);
   const bool held = answer && answer->standing == ns::NameStanding::held;
@@ -298,6 +309,17 @@ void SimNode::subscribe(const std::string& node) {
   ++last_request_;
   ask(Kind::ns, proto::encode(ns::Subscribe{node + "/" + kGiven}, last_request_), last_request_,
       {});
+}
+
+void SimNode::say_missed(GroupId group, std::uint64_t total) {
+  say_flow(proto::flow::Missed{group, total});
+}
+
+void SimNode::list_service(const std::string& node) {
+  ns::ServicesRequest request;
+  request.pattern = node + "/" + kGiven;
+  ++last_request_;
+  ask(Kind::ns, proto::encode(request, last_request_), last_request_, {});
 }
 
 void SimNode::resolve(const std::string& name, HubId hub) {

@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "proto/control/control_message.hpp"
@@ -35,6 +36,8 @@ class SimNode {
   void step(SimHub* hub, milliseconds now, std::uint64_t says_every);
   /// Its process ends, and comes back later with or without its memory.
   void crash(milliseconds now);
+  /// Its connection breaks. It comes back after so long, with its token.
+  void lose_connection(milliseconds now, std::uint64_t back_after_ms);
   /// It dials its other hub, and the one where it was hears nothing of it.
   void move(milliseconds now) { move_to(at_ == plan_.hub ? plan_.other : plan_.hub, now); }
   void move_to(std::size_t hub, milliseconds now);
@@ -76,6 +79,12 @@ class SimNode {
   void subscribe(const std::string& node);
   /// Numbers of the messages of that group that came since it was asked for.
   [[nodiscard]] std::vector<std::uint64_t>& heard(GroupId group) { return heard_[group]; }
+  /// It missed so many messages of that group in total.
+  void say_missed(GroupId group, std::uint64_t total);
+  void list_service(const std::string& node);
+  /// The answers to list_service(): messages that subscribers at its hub missed, and the one that
+  /// missed most.
+  [[nodiscard]] std::pair<std::uint64_t, NodeId> missed(GroupId group) { return missed_[group]; }
   void ask(proto::Kind kind, const proto::Payload& payload, std::uint16_t request, HubId hub);
   void resolve(const std::string& name, HubId hub);
   template <class Message>
@@ -135,6 +144,7 @@ class SimNode {
   std::map<proto::DropReason, milliseconds> first_report_;
   std::set<std::string> wanted_;  ///< full names of services
   std::map<GroupId, std::vector<std::uint64_t>> heard_;
+  std::map<GroupId, std::pair<std::uint64_t, NodeId>> missed_;
   milliseconds now_{0};
   milliseconds back_at_{0};
   milliseconds say_at_{0};

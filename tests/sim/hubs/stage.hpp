@@ -30,6 +30,14 @@ class Stage {
   void lose_state(std::size_t hub) {
     world_.machines_[hub].disk = world_.new_disk(world_.random_.next());
   }
+  [[nodiscard]] HubId hub_id(std::size_t hub) const {
+    return world_.machines_[hub].hub->facts().id;
+  }
+  /// The operator gives it that id, which holds from its next start on.
+  void set_hub_id(std::size_t hub, HubId id) {
+    world_.machines_[hub].plan.hub = id.value();
+    world_.machines_[hub].plan.configured = true;
+  }
   [[nodiscard]] SimNode& node(std::size_t index) { return world_.nodes_[index]; }
   [[nodiscard]] std::size_t nodes() const { return world_.nodes_.size(); }
   void crash(std::size_t index) { node(index).crash(world_.now_); }

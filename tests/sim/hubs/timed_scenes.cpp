@@ -78,11 +78,45 @@ void play_pictures(Stage& stage) {
   }
 }
 
+// A hub that began anew under another id gives way to nobody for a minute
+
+constexpr std::uint16_t kTwice = 1'030;
+
+/// Hub 0 has the id of hub 1, and both were drawn.
+Plan plan_minute() {
+  Plan plan = plan_of(3);
+  for (const std::size_t hub : {std::size_t{0}, std::size_t{1}}) {
+    plan.hubs[hub].hub = kTwice;
+    plan.hubs[hub].configured = false;
+  }
+  wire(plan, 0, 1);
+  wire(plan, 2, 0);
+  for (std::size_t hub = 0; hub < 3; ++hub) node(plan, hub);
+  return plan;
+}
+
+void play_minute(Stage& stage) {
+  stage.run(2 * kStartMs);
+  const HubId anew = stage.hub_id(0);
+  Stage::need(anew != HubId{kTwice} && stage.reachable(0) == 3, Checker::joined,
+              "the hub that dials has not drawn again");
+  stage.stop(2);
+  stage.set_hub_id(2, anew);
+  stage.start(2);
+  stage.run(50'000);
+  Stage::need(stage.hub_id(0) == anew && stage.reachable(0) == 2, Checker::joined,
+              "a hub that began anew gives way within a minute");
+  stage.run(15'000);
+  Stage::need(stage.hub_id(0) != anew && stage.reachable(2) == 3, Checker::joined,
+              "a hub with a drawn id does not give way to a configured one");
+}
+
 constexpr Scene kTimed[] = {
     {"no_route_after_a_closed_link", [] { return chain(2); }, play_closed_link},
     {"no_route_after_a_silent_link", [] { return chain(2); }, play_silent_link},
     {"pictures_of_a_slow_link", [] { return chain(2, kPictureDelayMs, kPictureRate); },
      play_pictures},
+    {"hub_that_began_anew_stays", plan_minute, play_minute},
 };
 
 }  // namespace

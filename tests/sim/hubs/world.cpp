@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstring>
+#include <utility>
 
 #include "tests/sim/hubs/scenes.hpp"
 
@@ -116,7 +117,10 @@ void World::step() {
     if (each == nullptr) continue;
     each->step(now_);
     if (!each->drained()) continue;
-    if (const auto redrawn = each->redrawn()) machines_[machine].plan.hub = redrawn->value();
+    if (const auto redrawn = each->redrawn()) {
+      machines_[machine].plan.hub = redrawn->value();
+      machines_[machine].redrawn = true;
+    }
     stop(machine);
     after_ms(random_.below(500), [this, machine] { start(machine); });
   }
@@ -165,6 +169,7 @@ SimHub::Setup World::setup_of(std::size_t machine) {
   setup.limits = plan_.limits;
   setup.facts.id = HubId{each.plan.hub};
   setup.facts.id_configured = each.plan.configured;
+  setup.facts.redrawn = std::exchange(each.redrawn, false);
   std::memcpy(setup.facts.unique.bytes.data(), each.disk.unique_id.data(),
               setup.facts.unique.bytes.size());
   setup.facts.instance = proto::HubInstance{random_.next()};

@@ -24,6 +24,7 @@ struct Machine {
   hub::HubState disk;
   std::unique_ptr<SimHub> hub;  ///< null: it does not run
   std::uint64_t life = 0;       ///< counts its processes
+  bool redrawn = false;         ///< its next process begins anew under another hub id
   bool stopped = false;         ///< its process gets no time
   bool dark = false;            ///< it has no power: nobody is told
 };
@@ -145,6 +146,12 @@ class Settled {
     const SimNode* to;
     std::uint64_t number;
   };
+  /// A service with last message.
+  struct Given {
+    SimNode* node;
+    GroupId group;
+    std::uint64_t last = 0;  ///< 0: none
+  };
   [[nodiscard]] bool has_edge(std::size_t one, std::size_t other) const;
   void check_wires() const;
   void check_tables() const;
@@ -153,6 +160,9 @@ class Settled {
   void find_distances();
   void check_moves();
   void check_groups();
+  /// May that operator subscribe to it?
+  [[nodiscard]] bool is_near(const SimNode& person, const Given& each) const;
+  void check_missed(const std::vector<Given>& all);
   void ask_names();
   void check_names();
   void send_to_all();
