@@ -231,6 +231,31 @@ class Removed(unittest.TestCase):
             self.assertEqual(sorted(end.numbers), list(range(stream.sent)))
         self.assertEqual([end.reported for end in ends], [{}, {}])
 
+    def test_a_hub_between_two_others_ends_while_frames_flow_through_it(self):
+        first = Hub(self, "--accept-links", *PATIENT, hub_id=1)
+        middle = Hub(self, "--accept-links", "--link", first.url, hub_id=2)
+        last = Hub(self, "--link", middle.url, *PATIENT, hub_id=3)
+        added = run_gimnet(f"unix:{last.socket_path}", "ctl", "link", "add", first.url, "--cost", "900")
+        self.assertEqual(added.code, 0, added.err)
+
+        def way_to(hub, other):
+            hubs = {each["id"]: each for each in json.loads(run_gimnet(hub, "hubs", "--json").out)}
+            return hubs[other]["via"] if other in hubs else None
+        wait_until(lambda: (way_to(last, 1), way_to(first, 3)) == (2, 2), "the way through hub 2")
+        ends = [Reader(Client(self, hub).join(name)) for hub, name in ((first, "A"), (last, "B"))]
+        streams = [Sender(here.client, there.client.id) for here, there in (ends, ends[::-1])]
+        for thread in ends + streams:
+            thread.start()
+        wait_until(lambda: all(len(end.numbers) > 50 for end in ends), "frames both ways")
+        middle.process.signal(signal.SIGTERM)
+        self.assertEqual(middle.process.wait(), 0, middle.process.err)
+        for stream in streams:
+            stream.stop()
+        for stream, end in zip(streams, ends[::-1]):
+            wait_until(lambda stream=stream, end=end: len(end.numbers) >= stream.sent, f"{stream.sent} frames")
+            self.assertEqual(sorted(end.numbers), list(range(stream.sent)))
+        self.assertEqual([end.reported for end in ends], [{}, {}])
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -111,6 +111,11 @@ class Conductor final : private Administration {
   [[nodiscard]] std::optional<HubId> redrawn() const {
     return ends_ || links_ == nullptr ? std::nullopt : links_->redrawn();
   }
+  /// Other hubs hear that this one will end. Returns the time after which it may drain.
+  [[nodiscard]] std::chrono::milliseconds announce_end(std::chrono::milliseconds now) {
+    return links_ == nullptr || redrawn() ? std::chrono::milliseconds{0}
+                                          : links_->announce_end(moment(now));
+  }
   /// Nobody new is admitted, and the shards say GOODBYE to everybody once what waits is written.
   void drain();
   [[nodiscard]] bool drained() const { return draining_ && shards_to_drain_ == 0; }

@@ -286,6 +286,16 @@ struct ConductorLoop::Impl {
     doors.clear();
     strangers.dismiss_all(
         {proto::GoodbyeCode::draining, "the hub is shutting down; connect to another one"}, now());
+    const milliseconds pause = wiring.conductor.announce_end(now());
+    if (pause == milliseconds{0}) return drain();
+    drain_deadline.emplace(context, pause);
+    drain_deadline->async_wait([this](const error_code& error) {
+      if (!error) drain();
+    });
+    arm_timer();
+  }
+
+  void drain() {
     wiring.conductor.drain();
     drain_deadline.emplace(context, milliseconds{wiring.limits.drain_ms} + kDrainMargin);
     drain_deadline->async_wait([this](const error_code& error) {

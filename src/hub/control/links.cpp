@@ -295,6 +295,13 @@ void Links::advance(Moment moment) {
     leave_network(verdict, moment);
 }
 
+milliseconds Links::announce_end(Moment moment) {
+  network_.announce_end();
+  advance(moment);
+  const bool is_between = std::ranges::count(network_.map().ways(), 1, &Way::hops) > 1;
+  return is_between ? kRemovalQuiet : milliseconds{0};
+}
+
 void Links::send_all(std::span<const Sending> sendings) {
   for (const Sending& sending : sendings) {
     const HubLink* link = links_.find(sending.link);

@@ -34,8 +34,8 @@ namespace gimnet::hub {
 class Links {
  public:
   static constexpr std::size_t kLinksMax = 4'093;
-  /// A link that is removed ends when nothing was under way on it for so long and two round trips:
-  /// both ends have computed other ways by then. Something always is where no other way leads.
+  /// Hubs have found other ways so long after a change. A link that is removed ends when nothing
+  /// was under way on it for that time and two round trips, or after the longer one.
   static constexpr std::chrono::milliseconds kRemovalQuiet{250};
   static constexpr std::chrono::milliseconds kRemovalMost{2'000};
   /// A hub that began anew gives way to no other hub before: whoever may link could end it at will.
@@ -77,6 +77,9 @@ class Links {
   [[nodiscard]] std::optional<std::chrono::milliseconds> next_deadline() const;
   /// No link is dialled or taken any more.
   void drain() { draining_ = true; }
+  /// Tells other hubs that this one will end. Returns when it may: frames between others have found
+  /// other ways by then. 0: none comes through here, since there are less than two neighbours.
+  [[nodiscard]] std::chrono::milliseconds announce_end(Moment moment);
 
   /// The id to begin anew with, once another hub was found to keep the one that this hub drew.
   [[nodiscard]] std::optional<HubId> redrawn() const { return redrawn_; }

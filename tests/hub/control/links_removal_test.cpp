@@ -83,5 +83,16 @@ TEST(LinksRemoval, ARemovedOneIsGoneOnceItBreaksOrItsHubLeaves) {
   }
 }
 
+TEST(LinksRemoval, AHubThatWillEndSaysThatItsLinksCostMost) {
+  LinkedRigs hubs(LinkRig::dialling("up", 5));
+  hubs.link();
+  EXPECT_EQ(hubs.b.links.announce_end(hubs.b.moment()), milliseconds{0})
+      << "nothing comes through a hub with one neighbour";
+  for (int i = 0; i < 3; ++i) hubs.pass(milliseconds{100});
+  EXPECT_EQ(hubs.a.links.network().map().ways().front().cost, 65'535u);
+  EXPECT_TRUE(hubs.a.routes.find(kB).exists());
+  EXPECT_TRUE(hubs.b.routes.find(kA).exists());
+}
+
 }  // namespace
 }  // namespace gimnet::hub

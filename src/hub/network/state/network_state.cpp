@@ -4,6 +4,7 @@
 #include <tuple>
 
 #include "base/check.hpp"
+#include "hub/network/state/link_cost.hpp"
 
 namespace gimnet::hub {
 namespace {
@@ -196,6 +197,8 @@ void NetworkState::advance(std::chrono::milliseconds now) {
     links_changed_ = false;
     std::vector<proto::route::Neighbour> neighbours;
     for (const CarryingLink& each : carrying_links()) neighbours.push_back(each.neighbour);
+    for (auto& each : neighbours)
+      if (ends_) each.cost = LinkCost::kMost;
     own_.set_neighbours(neighbours);
   }
   say_own(now);

@@ -162,6 +162,9 @@ class NetworkState {
     const auto found = links_.find(number);
     return found != links_.end() && found->second.has_mark;
   }
+  /// This hub will end: from now on it says that its links cost as much as they can, so that others
+  /// find ways around it. Its own ways stay.
+  void announce_end() { ends_ = links_changed_ = true; }
   /// Ends all links: after a verdict.
   void leave();
   /// Takes another hub id. REQUIRES: no link.
@@ -214,6 +217,7 @@ class NetworkState {
   NetworkMap map_;
   std::uint64_t maps_ = 1;
   std::map<LinkNumber, Link> links_;
+  bool ends_ = false;
   bool links_changed_ = false;      ///< the own record is to say so
   bool map_changed_ = false;        ///< it is to be computed
   bool reachable_changed_ = false;  ///< the store is to know
