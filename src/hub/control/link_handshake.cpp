@@ -1,5 +1,6 @@
 #include "hub/control/link_handshake.hpp"
 
+#include <algorithm>
 #include <string>
 #include <utility>
 
@@ -48,13 +49,30 @@ std::optional<Goodbye> LinkHandshake::refusal_of(const proto::HubIntroduction& s
                      "this hub has the same hub id, and draws another one; try again"};
     case LinkAdmission::id_taken: {
       const bool own = said.hub.hub == parts_.facts.id;
-      const std::string holder = own ? "hub '" + parts_.facts.name + "'" : "another hub";
+      const std::string holder = own             ? "hub '" + parts_.facts.name + "'"
+                                 : answer.holder ? describe(*answer.holder)
+                                                 : "another hub";
       return Goodbye{GoodbyeCode::id_taken, "hub id " + std::to_string(said.hub.hub.value()) +
                                                 " is taken by " + holder +
                                                 "; give one of them another one with --hub-id"};
     }
   }
   return std::nullopt;
+}
+
+std::string LinkHandshake::describe(const proto::HubKey& holder) const {
+  const StoredRecord* record = parts_.network.store().find(holder);
+  const auto* head = record == nullptr ? nullptr : record->head();
+  const std::string name =
+      head == nullptr || head->name.empty() ? "another hub" : "hub '" + head->name + "'";
+  const auto& ways = parts_.network.map().ways();
+  const auto way = std::ranges::find(ways, holder, &Way::hub);
+  const auto link = way == ways.end() ? parts_.links.end() : parts_.links.find(way->link);
+  if (link == parts_.links.end()) return name;
+  const std::string& address = link->second->address;
+  return name + (way->hops == 1 ? ", linked at " + address
+                                : ", " + std::to_string(way->hops) + " links away behind " +
+                                      link->second->title() + " at " + address);
 }
 
 std::string LinkHandshake::taken_sentence(const HubLink* over) const {

@@ -7,6 +7,7 @@
 #include "hub/control/acceptor.hpp"
 #include "hub/control/hub_facts.hpp"
 #include "hub/control/hub_link.hpp"
+#include "hub/control/link_roster.hpp"
 #include "hub/limits.hpp"
 #include "hub/network/state/network_state.hpp"
 #include "hub/shard/commands.hpp"
@@ -23,6 +24,7 @@ class LinkHandshake {
     const Limits& limits;
     const LinksOptions& options;
     const NetworkState& network;
+    const LinkRoster::All& links;
   };
   explicit LinkHandshake(const Parts& parts) : parts_(parts) {}
 
@@ -48,6 +50,9 @@ class LinkHandshake {
   [[nodiscard]] std::string taken_sentence(const HubLink* over) const;
 
  private:
+  /// The hub that has an id: its name, and the link over which it is reached, as far as known.
+  [[nodiscard]] std::string describe(const proto::HubKey& holder) const;
+
   const Parts parts_;
 };
 

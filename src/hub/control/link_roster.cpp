@@ -7,6 +7,14 @@
 #include "base/check.hpp"
 
 namespace gimnet::hub {
+namespace {
+
+/// Of a link that the other side dialled.
+std::string shown_name(const HubLink& link) {
+  return "from hub " + std::to_string(link.peer()->hub.hub.value());
+}
+
+}  // namespace
 
 HubLink* LinkRoster::find(LinkNumber number) const {
   const auto found = links_.find(number);
@@ -21,9 +29,10 @@ HubLink* LinkRoster::find(const SessionRef& session) const {
 HubLink* LinkRoster::find(std::string_view name) const {
   HubLink* accepted = nullptr;
   for (const auto& [number, link] : links_) {
-    if (link->name() != name) continue;
-    if (link->is_dialled()) return link.get();
-    accepted = link.get();
+    const bool named = link->name() == name;
+    if (named && link->is_dialled()) return link.get();
+    if (named || (!link->is_dialled() && link->peer() && name == shown_name(*link)))
+      accepted = link.get();
   }
   return accepted;
 }
@@ -35,6 +44,16 @@ HubLink* LinkRoster::find_accepted(const proto::UniqueId& dialler, std::string_v
     if (same) return link.get();
   }
   return nullptr;
+}
+
+Result<HubLink*> LinkRoster::to_change(std::string_view name, std::string_view how) const {
+  HubLink* const link = find(name);
+  if (link == nullptr)
+    return Error{"there is no link '" + std::string{name} + "'; see gimnet links"};
+  if (link->is_dialled()) return link;
+  const std::string there = link->peer() ? link->title() : "the other side";
+  return Error{there + " dials that link; change it there: gimnet ctl link " + std::string{how} +
+               " " + link->name()};
 }
 
 HubLink& LinkRoster::add(DialledLink dialled) {

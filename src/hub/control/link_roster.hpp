@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "base/result.hpp"
 #include "hub/control/hub_link.hpp"
 #include "hub/shard/commands.hpp"
 
@@ -24,10 +25,15 @@ class LinkRoster {
   // Null: there is none.
   [[nodiscard]] HubLink* find(LinkNumber number) const;
   [[nodiscard]] HubLink* find(const SessionRef& session) const;
-  /// Dialled links go first: the other side chose the names of accepted ones.
+  /// Dialled links go first: the other side chose the names of accepted ones. These are found as
+  /// `from hub N`, too, as `gimnet links` shows them.
   [[nodiscard]] HubLink* find(std::string_view name) const;
   /// The one that the hub with that unique id dialled under that name.
   [[nodiscard]] HubLink* find_accepted(const proto::UniqueId& dialler, std::string_view name) const;
+
+  /// The dialled link of that name, or why none can be changed. `how`: the word of `gimnet ctl
+  /// link` with which the other side can.
+  [[nodiscard]] Result<HubLink*> to_change(std::string_view name, std::string_view how) const;
 
   HubLink& add(DialledLink dialled);
   /// One that the other side dialled.

@@ -27,7 +27,7 @@ Links::Links(LinksOptions options, const Wiring& wiring)
                 wiring.facts.instance,
                 wiring.facts.id_configured},
                {wiring.facts.name, wiring.facts.version}),
-      handshake_({wiring.facts, wiring.limits, options_, network_}) {
+      handshake_({wiring.facts, wiring.limits, options_, network_, links_.all()}) {
   for (const DialledLink& link : options_.dial) static_cast<void>(add(link));
 }
 
@@ -363,9 +363,9 @@ std::string Links::add(const DialledLink& link) {
 }
 
 std::string Links::remove(std::string_view name) {
-  HubLink* const link = links_.find(name);
-  if (link == nullptr) return "there is no link '" + std::string{name} + "'; see gimnet links";
-  if (!link->is_dialled()) return "the other side dials that link; remove it there";
+  const Result<HubLink*> found = links_.to_change(name, "remove");
+  if (!found) return found.error().sentence;
+  HubLink* const link = *found;
   if (!link->connected()) {
     give_up(*link);
   } else if (!std::exchange(link->removed, true)) {
@@ -382,10 +382,10 @@ std::string Links::remove(std::string_view name) {
 }
 
 std::string Links::set_cost(std::string_view name, std::uint16_t cost) {
-  HubLink* const link = links_.find(name);
-  if (link == nullptr || link->removed)
-    return "there is no link '" + std::string{name} + "'; see gimnet links";
-  if (!link->is_dialled()) return "the other side dials that link; set its cost there";
+  const Result<HubLink*> found = links_.to_change(name, "cost");
+  if (!found) return found.error().sentence;
+  HubLink* const link = *found;
+  if (link->removed) return "that link is removed";
   link->fix_cost(cost);
   network_.set_cost(link->number(), link->cost());
   return {};

@@ -138,9 +138,9 @@ class Links {
   const Wiring wiring_;
   NextHops next_hops_;
   NetworkState network_;
-  const LinkHandshake handshake_;  ///< of these
-  std::uint64_t map_seen_ = 0;     ///< the map that the names were told of
+  std::uint64_t map_seen_ = 0;  ///< the map that the names were told of
   LinkRoster links_;
+  const LinkHandshake handshake_;  ///< of these
   LinkTotals totals_;
   std::uint64_t counts_begun_ = 0;  ///< as numbers of this instance; none of them is 0
   bool draining_ = false;

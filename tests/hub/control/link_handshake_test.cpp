@@ -13,7 +13,7 @@ using proto::GoodbyeCode;
 struct HandshakeRig : LinkRig {
   HandshakeRig() : LinkRig(1, {}) {}
   LinksOptions options = accepting();
-  LinkHandshake handshake{{facts, limits, options, links.network()}};
+  LinkHandshake handshake{{facts, limits, options, links.network(), links.all()}};
 
   std::optional<proto::Goodbye> judge(const proto::Hello& hello, const char* transport = "tcp") {
     Stranger stranger;
@@ -64,6 +64,21 @@ TEST(LinkHandshake, TheLongestHelloFits) {
   const HubLink link(LinkNumber{1}, to);
   const auto bytes = net::encode_hello(rig.handshake.hello_for(link, UINT64_MAX));
   EXPECT_LE(bytes.size(), proto::kAdmissionBytesMax);
+}
+
+TEST(LinkHandshake, TheRefusalOfATakenIdNamesItsHolder) {
+  LinkedRigs hubs;
+  hubs.link();
+  LinkRig twin(2, LinkRig::dialling());
+  twin.links.tick(twin.moment());
+  proto::Hello hello = twin.dialled.back().hello;
+  hello.introduction->hub.unique.bytes[5] = 9;
+  hello.introduction->instance = proto::HubInstance{77};
+  const auto refusal = hubs.a.admit(hello);
+  ASSERT_TRUE(refusal);
+  EXPECT_EQ(refusal->sentence,
+            "hub id 2 is taken by hub 'hub-2', linked at 127.0.0.1:5000; give one of them another "
+            "one with --hub-id");
 }
 
 }  // namespace

@@ -54,6 +54,25 @@ TEST(LinkRoster, KnowsAnAcceptedLinkByItsDialler) {
   EXPECT_EQ(table.find_accepted({}, "up"), nullptr);
 }
 
+TEST(LinkRoster, SaysWhereALinkOfTheOtherSideIsChanged) {
+  LinkRoster table;
+  HubLink& link = table.add_accepted("up");
+  proto::HubIntroduction said;
+  said.hub = {HubId{7}, {}};
+  said.hub_name = "lab";
+  link.begin_connection(said, {}, milliseconds{0});
+  for (const char* name : {"up", "from hub 7"}) {
+    const auto found = table.to_change(name, "remove");
+    ASSERT_FALSE(found);
+    EXPECT_EQ(found.error().sentence,
+              "hub 7 'lab' dials that link; change it there: gimnet ctl link remove up");
+  }
+  EXPECT_EQ(table.to_change("from hub 8", "cost").error().sentence,
+            "there is no link 'from hub 8'; see gimnet links");
+  HubLink& dialled = table.add(named("up"));
+  EXPECT_EQ(*table.to_change("up", "cost"), &dialled);
+}
+
 TEST(LinkRoster, TellsWhichEndedLongAgo) {
   LinkRoster table;
   table.add(named("dialled"));
