@@ -265,6 +265,20 @@ class Between(unittest.TestCase):
         self.assertGreaterEqual(first.counter("dropped.not_allowed"), 3)
         self.assertEqual((receiver.out, second.status()["counters"]["dropped.not_allowed"]), (b"", 0))
 
+    def test_a_hub_that_does_not_answer_costs_the_same_exit_code_everywhere(self):
+        file = os.path.join(self.enterContext(tempfile.TemporaryDirectory(prefix="gimnet-test-")), "hub.toml")
+        with open(file, "w", encoding="utf-8") as text:
+            text.write("[links]\naccept_links = true\nsilent_ms = 60000\n")
+        first = Hub(self, "--config", file, hub_id=1)
+        second = Hub(self, "--link", first.url, hub_id=2)
+        linked(first, 2)
+        second.process.signal(signal.SIGSTOP)
+        asked = [start_gimnet(self, first, command, "--hub-id", "2") for command in ("links", "status", "hubs")]
+        for each in asked:
+            self.assertEqual(each.wait(), 5, each.err)
+            self.assertEqual(each.err, "gimnet: hub 2 did not answer within 4.9 s; see gimnet hubs\n")
+        second.process.signal(signal.SIGCONT)
+
     def test_a_hub_drains_beside_a_silent_link(self):
         first = Hub(self, "--accept-links", hub_id=1)
         network = Process([GIMNET, "impair", "tcp://127.0.0.1:0", first.url], stdin=subprocess.PIPE)

@@ -5,6 +5,7 @@
 
 #include "tools/gimnet/json_writer.hpp"
 #include "tools/gimnet/member_status.hpp"
+#include "tools/gimnet/network.hpp"
 #include "tools/gimnet/session.hpp"
 #include "tools/gimnet/table.hpp"
 #include "tools/gimnet/watch.hpp"
@@ -293,11 +294,11 @@ ExitCode run_status(ToolSession& session) {
   if (const auto ending = session.join_to_look()) return *ending;
   if (session.options().all) return run_status_of_all(session);
   const std::uint32_t hub_id = session.options().hub_id;
-  const auto hub = session.node().hub(Timeout{5000}, hub_id);
+  const auto hub = session.node().hub(kHubPatience, hub_id);
   if (!hub) return session.fail(hub.failure());
-  const auto connections = session.node().hub_connections(Timeout{5000}, hub_id);
+  const auto connections = session.node().hub_connections(kHubPatience, hub_id);
   if (!connections) return session.fail(connections.failure());
-  const auto shards = session.node().hub_counters(Timeout{5000}, hub_id);
+  const auto shards = session.node().hub_counters(kHubPatience, hub_id);
   if (!shards) return session.fail(shards.failure());
   const HubStatus status{*hub, *shards, *connections};
   session.output().write(session.options().json ? json_of(status)

@@ -217,7 +217,6 @@ ExitCode show(ToolSession& session, const Outcome<Records>& found) {
   return session.finish();
 }
 
-constexpr Timeout kPatience{5000};
 /// More hubs than any way has.
 constexpr std::size_t kWayMax = 64;
 
@@ -226,7 +225,7 @@ Outcome<std::vector<RouteStep>> way_to(ToolSession& session, std::uint32_t targe
   std::vector<RouteStep> way;
   std::uint32_t at = session.options().hub_id;  // 0: the own hub
   while (way.size() < kWayMax) {
-    const auto hubs = session.node().hubs(kPatience, at);
+    const auto hubs = session.node().hubs(kHubPatience, at);
     if (!hubs && way.empty()) return hubs.failure();
     if (!hubs) {
       say("hub " + std::to_string(at) + " cannot be asked: " + hubs.failure().sentence);
@@ -254,12 +253,12 @@ Outcome<std::vector<RouteStep>> way_to(ToolSession& session, std::uint32_t targe
 
 ExitCode run_hubs(ToolSession& session) {
   if (const auto ending = session.join_to_look()) return *ending;
-  return show(session, session.node().hubs(kPatience, session.options().hub_id));
+  return show(session, session.node().hubs(kHubPatience, session.options().hub_id));
 }
 
 ExitCode run_links(ToolSession& session) {
   if (const auto ending = session.join_to_look()) return *ending;
-  return show(session, session.node().hub_links(kPatience, session.options().hub_id));
+  return show(session, session.node().hub_links(kHubPatience, session.options().hub_id));
 }
 
 ExitCode run_routes(ToolSession& session) {
@@ -281,7 +280,7 @@ ExitCode run_routes(ToolSession& session) {
 ExitCode run_graph(ToolSession& session) {
   if (const auto ending = session.join_to_look()) return *ending;
   const ToolOptions& options = session.options();
-  const auto hubs = session.node().hubs(kPatience, options.hub_id);
+  const auto hubs = session.node().hubs(kHubPatience, options.hub_id);
   if (!hubs) return session.fail(hubs.failure());
   session.output().write(options.json  ? graph_json(*hubs)
                          : options.dot ? graph_dot(*hubs)

@@ -12,6 +12,10 @@
 
 namespace gimnet::tool {
 
+/// For an answer of a hub. The own hub answers `not_found` for one that is silent for 5 s; before
+/// that the time is over, which is the same for all commands.
+inline constexpr Timeout kHubPatience{4'900};
+
 class ToolSession;
 
 /// A list of objects and a newline, or a table.

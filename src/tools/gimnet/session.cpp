@@ -237,8 +237,12 @@ ExitCode ToolSession::fail(const Failure& failure) {
   const NodeState state = lost && node_ ? node_->state() : NodeState{};
   const bool known =
       !state.trouble.empty() && (state.ended || failure.status == Status::not_connected);
-  say(known ? "lost the connection to the hub: " + state.trouble
-            : in_commands(failure.sentence, options_.target));
+  if (failure.status == Status::timeout && options_.hub_id != 0) {
+    say("hub " + std::to_string(options_.hub_id) + " did not answer within 4.9 s; see gimnet hubs");
+  } else {
+    say(known ? "lost the connection to the hub: " + state.trouble
+              : in_commands(failure.sentence, options_.target));
+  }
   return exit_code_of(failure.status);
 }
 
