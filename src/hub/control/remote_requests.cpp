@@ -29,6 +29,11 @@ std::optional<proto::Refusal> RemoteRequests::send_on(const ControlFrameEvent& e
   const HubId hub = hub_of(NodeId{header.dst});
   const auto control = proto::split_control(payload_of(event));
   const bool to_a_hub = index_of(NodeId{header.dst}) == kHubIndex;
+  if (parts_.links.next_hops().find(hub).one_way) {
+    return proto::Refusal{proto::Status::denied,
+                          "the link towards hub " + std::to_string(hub.value()) +
+                              " may not bring its answers: see `allow` in docs/operations.md"};
+  }
   if (!control || !to_a_hub || !parts_.links.next_hops().send_towards(hub, event.frame)) {
     return proto::Refusal{proto::Status::not_found,
                           "there is no route from hub " + std::to_string(parts_.facts.id.value()) +

@@ -74,6 +74,19 @@ TEST(RemoteRequests, WithoutARouteTheRefusalSaysSo) {
   EXPECT_NE(refusal->sentence.find("hub 3"), std::string::npos);
 }
 
+TEST(RemoteRequests, WhereNoAnswerMayComeTheRefusalSaysSo) {
+  LinksOptions options = LinkRig::dialling();
+  options.dial[0].terms.allow = {HubId{9}};
+  LinkedRigs hubs(options);
+  hubs.link();
+  RemoteRequests requests({hubs.b.facts, hubs.b.shards, hubs.b.links});
+  const auto refusal = requests.send_on(Rig().request(HubId{1}, 9), ShardIndex{0}, hubs.b.now);
+  ASSERT_TRUE(refusal);
+  EXPECT_EQ(refusal->status, proto::Status::denied);
+  EXPECT_NE(refusal->sentence.find("`allow`"), std::string::npos);
+  EXPECT_FALSE(requests.next_due());
+}
+
 TEST(RemoteRequests, AFloodFromOneLinkIsAnsweredRate) {
   Rig rig;
   const auto ask = proto::encode(proto::ctrl::HubInfo{}, 1);
