@@ -88,6 +88,7 @@ class Arguments(unittest.TestCase):
         for words, part in ((("127.0.0.1:1", "tcp://127.0.0.1:2"), "'127.0.0.1:1': the scheme is unknown"),
                             (("tcp://127.0.0.1:0", "tcp://host"), "'tcp://host': the port is missing"),
                             (("tcp://127.0.0.1:0", "unix:x", "--delay", "80"), "'80' is no value for --delay"),
+                            (("unix:/x", "unix:/x"), "cannot relay unix:/x to itself: listen on another port or path"),
                             (("tcp://127.0.0.1:0",), "target is missing")):
             with self.subTest(words=words):
                 ended = subprocess.run([str(BIN / "gimnet"), "impair", *words], capture_output=True, text=True,
@@ -97,7 +98,7 @@ class Arguments(unittest.TestCase):
 
     def test_an_address_in_use_is_told(self):
         hub = Hub(self)
-        ended = subprocess.run([str(BIN / "gimnet"), "impair", hub.url, hub.url], capture_output=True, text=True,
+        ended = subprocess.run([str(BIN / "gimnet"), "impair", hub.url, "unix:/x"], capture_output=True, text=True,
                                timeout=20, stdin=subprocess.DEVNULL)
         self.assertEqual(ended.returncode, 1)
         self.assertIn("Address already in use", ended.stderr)

@@ -54,8 +54,8 @@ void HubLink::begin_connection(const proto::HubIntroduction& said, const LinkTer
   connected_ = true;
   allow_ = own.allow;
   exchange_begun = false;
-  keep_alive_ms_ = std::max(own.keep_alive_ms, said.keep_alive_ms);
-  silent_ms_ = std::max(own.silent_ms, said.silent_ms);
+  keep_alive_ms_ = std::max(own.keep_alive_ms, std::min(said.keep_alive_ms, kTimesMostMs));
+  silent_ms_ = std::max(own.silent_ms, std::min(said.silent_ms, kTimesMostMs));
   keep_alive_at_ = heard_at_ = now;
   heard_sent_ns_ = heard_ns_ = 0;
   if (!same || !resume_until_) {

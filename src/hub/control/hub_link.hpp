@@ -40,6 +40,8 @@ class HubLink {
   static constexpr std::size_t kBreaksMost = 2;
   static constexpr std::chrono::milliseconds kBreaksWithin = std::chrono::minutes(1);
   static constexpr std::chrono::milliseconds kDampedMost = std::chrono::seconds(10);
+  /// The other end's times count up to this: a link that is never silent would never end.
+  static constexpr std::uint32_t kTimesMostMs = 3'600'000;
   /// A link that the other side gave up is shown for so long.
   static constexpr std::chrono::milliseconds kEndedShown = std::chrono::minutes(10);
   /// The other clock is compared by the shortest of so many latest round trips, since clocks drift.

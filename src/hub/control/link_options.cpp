@@ -29,6 +29,10 @@ Result<DialledLink> make_link(std::string_view url, std::string_view name) {
   }
   const Result<net::Address, net::NetError> address = net::parse_address(url);
   if (!address) return Error{address.error().sentence};
+  if (address->scheme == net::Address::Scheme::unix_socket && !address->path.starts_with('/')) {
+    return Error{"cannot link to '" + std::string{url} +
+                 "': the path would begin in the folder that the hub runs in; write unix:/path"};
+  }
   if (name.size() > proto::kNameBytesMax || !is_printable(name)) {
     return Error{"a link cannot have the name '" + escaped(name, kQuotedMax) + "': give at most " +
                  std::to_string(proto::kNameBytesMax) +

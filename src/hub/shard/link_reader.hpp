@@ -7,9 +7,10 @@
 
 namespace gimnet::hub {
 
-/// Frames that come over a link and are not routed. A link is always read, and only an impossible
-/// length ends it: a frame that is not understood is dropped and counted, or resume would send it
-/// for ever (docs/protocol.md, section 10). Thread safety: one shard.
+/// Frames that come over a link and are not routed. A link is always read. Only an impossible
+/// length and a frame of kind LINK end it. Another frame that is not understood is dropped and
+/// counted, or resume would send it for ever (docs/protocol.md, section 10). Thread safety: one
+/// shard.
 class LinkReader {
  public:
   LinkReader(ShardState& state, HubFrames& hub_frames) : state_(state), hub_frames_(hub_frames) {}

@@ -152,6 +152,11 @@ ExitCode run_impair(const ImpairOptions& options, StopSignal& stop) {
     say(each->error().sentence);
     return ExitCode::usage;
   }
+  // With port 0 the kernel chooses another one than that of the target.
+  if (*listen == *target) {
+    say("cannot relay " + target->url() + " to itself: listen on another port or path");
+    return ExitCode::usage;
+  }
   auto opened = impair::FaultProxy::open(*listen, *target, options.how, options.seed);
   if (!opened) {
     say(opened.error().sentence);

@@ -34,6 +34,18 @@ TEST(HubLink, TheLargerTimesOfBothEndsCount) {
   EXPECT_EQ(link.keep_alive_at(), milliseconds{1'000 + kLinkKeepAliveMs});
 }
 
+TEST(HubLink, TimesThatNeverEndCountAsAnHour) {
+  HubLink link(LinkNumber{1}, "up");
+  proto::HubIntroduction said = introduction();
+  said.silent_ms = said.keep_alive_ms = UINT32_MAX;
+  link.begin_connection(said, {}, milliseconds{1'000});
+  EXPECT_EQ(link.silent_ms(), 3'600'000u);
+  EXPECT_EQ(link.keep_alive_ms(), 3'600'000u);
+  said.silent_ms = said.keep_alive_ms = 0;
+  link.begin_connection(said, {}, milliseconds{2'000});
+  EXPECT_EQ(link.silent_ms(), kLinkSilentMs);
+}
+
 TEST(HubLink, MayComeBackForItsTimeAndFourRoundTrips) {
   HubLink link(LinkNumber{1}, "up");
   link.begin_connection(introduction(), {}, milliseconds{1'000});

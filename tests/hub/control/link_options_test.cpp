@@ -29,6 +29,7 @@ TEST(LinkOptions, SaysWhatIsWrongWithAUrlOrAName) {
   EXPECT_THAT(fault("tcp://a b:1"), AllOf(HasSubstr("'tcp://a b:1'"), HasSubstr("without spaces")));
   EXPECT_THAT(fault("unix:/a\nb"), HasSubstr("without spaces and control characters"));
   EXPECT_THAT(fault("unix:/\xff"), HasSubstr("cannot link to"));
+  EXPECT_THAT(fault("unix:hub.sock"), HasSubstr("cannot link to 'unix:hub.sock': the path would"));
   EXPECT_THAT(fault("tcp://" + std::string(250, 'h') + ":1"), HasSubstr("at most 255 bytes"));
   EXPECT_THAT(fault("tcp://h:1", "a b"), HasSubstr("a link cannot have the name 'a b'"));
   EXPECT_THAT(fault("tcp://h:1", std::string(256, 'n')), HasSubstr("at most 255 bytes"));
