@@ -70,7 +70,9 @@ class GroupLinks::Change {
     command.session = ref_of(member.place);
     command.group = group_;
     const auto depth_most = static_cast<std::uint32_t>(parts_.limits.subscription_depth);
-    const std::uint32_t asked = member.terms.window;
+    // One that is on its way over the link does not wait here any more, and has not been taken.
+    const std::uint32_t wish = member.terms.window;
+    const std::uint32_t asked = wish > 1 ? wish - 1 : wish;
     const bool all = asked == 0 || (stream_.window != 0 && stream_.window < asked);
     command.terms = {all ? stream_.window : asked,
                      std::min<std::uint32_t>(member.terms.depth, depth_most),

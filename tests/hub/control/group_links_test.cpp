@@ -99,8 +99,11 @@ TEST_F(GroupLinksTest, ALinkIsPacedAsItsTermsSay) {
   EXPECT_EQ(members(kOwnGroup)->paced_by_shard.at(0).size(), 1u);
   const PaceCommand* pace = rig_.shards.all<PaceCommand>().back();
   EXPECT_EQ(pace->terms, (PaceTerms{0, 64, 1'000'000})) << "no more than one node may hold";
-  static_cast<void>(take(kDown, route::Join{{{kOwnGroup, {0, 1, 2}}}, false}));
-  EXPECT_EQ(rig_.shards.all<PaceCommand>().back()->terms, (PaceTerms{2, 1, 0}));
+  static_cast<void>(take(kDown, route::Join{{{kOwnGroup, {0, 1, 3}}}, false}));
+  EXPECT_EQ(rig_.shards.all<PaceCommand>().back()->terms, (PaceTerms{2, 1, 0}))
+      << "one of three is on its way";
+  static_cast<void>(take(kDown, route::Join{{{kOwnGroup, {0, 1, 1}}}, false}));
+  EXPECT_EQ(rig_.shards.all<PaceCommand>().back()->terms, (PaceTerms{1, 1, 0}));
   static_cast<void>(take(kDown, route::Join{{{kOwnGroup, {}}}, false}));
   EXPECT_EQ(rig_.shards.all<PaceCommand>().back()->terms, (PaceTerms{0, 1, 0}));
   EXPECT_EQ(members(kOwnGroup)->paced_by_shard.at(0).size(), 1u)
