@@ -8,6 +8,7 @@ import time
 from typing import Any, Dict, Optional
 
 from . import _c, bitestream, errors, messages
+from .errand import interruptible
 from .handles import PIECE_MS, Handle, NotCopied, Stream, Waitable, end_of, in_pieces, to_text
 from .messages import Peer
 
@@ -100,7 +101,8 @@ class Request(_Content, NotCopied):
         """Answers with an error of the program's own; a code has 32 bits. Closed."""
         if ctypes.c_int32(code).value != code:
             raise errors.BadArgument(f"the code of an error has 32 bits, and this is {code}")
-        errors.check(_c.lib.gimi_fail_request(self._raw, code, to_text(sentence)))
+        words = to_text(sentence)
+        interruptible(lambda: errors.check(_c.lib.gimi_fail_request(self._raw, code, words)))
 
     def __del__(self) -> None:
         _c.lib.gimi_request_release(self._raw)
