@@ -92,7 +92,7 @@ void World::note_dialled(const Line& line) {
 }
 
 void World::carry(Line& line) {
-  const Wire& wire = wires_[line.wire];
+  Wire& wire = wires_[line.wire];
   for (std::size_t way = 0; way < 2; ++way) {
     if (line.dead || wire.cut[way]) continue;
     const Crossing crossing{line.wire, way == 0 ? wire.plan.dialler : wire.plan.acceptor,
@@ -102,6 +102,7 @@ void World::carry(Line& line) {
               [&](const proto::FrameHeader& header, std::span<const std::byte> body) {
                 // Bytes that a closed connection left in the kernel reach nobody.
                 if (line.peers[1 - way].transport_gone()) return;
+                ++wire.frames;
                 if (options_.print && header.kind == proto::Kind::unicast && body.size() >= 8)
                   note("frame " + std::to_string(load_le<std::uint64_t>(body.data())) +
                        " on line " + std::to_string(line.number) + " from hub " +

@@ -53,6 +53,10 @@ class Stage {
   [[nodiscard]] std::uint64_t line_of(std::size_t wire) const {
     return world_.wires_[wire].counted[0].line;
   }
+  /// That crossed it so far, both ways.
+  [[nodiscard]] std::uint64_t frames_of(std::size_t wire) const {
+    return world_.wires_[wire].frames;
+  }
   [[nodiscard]] std::uint64_t sent() const { return world_.book_.sent(); }
   [[nodiscard]] std::uint64_t arrived() const { return world_.book_.arrived(); }
   [[nodiscard]] bool has_arrived(std::uint64_t number) const {

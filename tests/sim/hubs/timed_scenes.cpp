@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <vector>
 
 #include "tests/sim/hubs/scene_plans.hpp"
 
@@ -47,6 +48,56 @@ void play_silent_link(Stage& stage) {
   stage.cut(0);
   expect_no_route(stage, kNoRouteAfterSilenceMs);
   stage.mend(0);
+}
+
+// Frames find another way
+
+constexpr std::uint64_t kOtherWayAfterCloseMs = 500;
+constexpr std::uint64_t kOtherWayAfterSilenceMs = 1'500;
+constexpr std::uint64_t kOnItsWayMs = 20;
+
+/// Frames from hub 0 to hub 2 of a ring of four, which went through hub 1, come in time.
+void expect_other_way(Stage& stage, std::uint64_t within_ms) {
+  std::vector<std::uint64_t> numbers;
+  for (std::uint64_t ms = 0; ms < within_ms; ms += 10) {
+    const auto number = stage.node(0).send_to(stage.node(2).id());
+    Stage::need(number.has_value(), Checker::resumes, "a node may not send");
+    // Frames that had passed hub 1 still come.
+    if (ms >= kOnItsWayMs) numbers.push_back(*number);
+    stage.run(10);
+  }
+  stage.run(kOnItsWayMs);
+  Stage::need(std::ranges::any_of(numbers, [&](auto each) { return stage.has_arrived(each); }),
+              Checker::reachable, "frames do not find another way in time");
+}
+
+void play_other_way_after_close(Stage& stage) {
+  stage.run(kStartMs);
+  stage.stop(1);
+  expect_other_way(stage, kOtherWayAfterCloseMs);
+  stage.start(1);
+}
+
+void play_other_way_after_silence(Stage& stage) {
+  stage.run(kStartMs);
+  stage.cut(0);
+  expect_other_way(stage, kOtherWayAfterSilenceMs);
+  stage.mend(0);
+}
+
+// Links of which nobody wants anything
+
+void play_idle(Stage& stage) {
+  constexpr std::uint64_t kSeconds = 20;
+  constexpr std::uint64_t kFramesMost = 10;  ///< a second and link
+  // Costs fall for a while, and each fall is told.
+  stage.run(10'000);
+  std::uint64_t before[3];
+  for (std::size_t wire = 0; wire < 3; ++wire) before[wire] = stage.frames_of(wire);
+  stage.run(kSeconds * 1'000);
+  for (std::size_t wire = 0; wire < 3; ++wire)
+    Stage::need(stage.frames_of(wire) - before[wire] <= kSeconds * kFramesMost, Checker::bounded,
+                "an idle link carries more than 10 frames a second");
 }
 
 // Pictures over a link that is too slow for all of them
@@ -114,6 +165,9 @@ void play_minute(Stage& stage) {
 constexpr Scene kTimed[] = {
     {"no_route_after_a_closed_link", [] { return chain(2); }, play_closed_link},
     {"no_route_after_a_silent_link", [] { return chain(2); }, play_silent_link},
+    {"other_way_after_a_closed_link", [] { return ring(4); }, play_other_way_after_close},
+    {"other_way_after_a_silent_link", [] { return ring(4); }, play_other_way_after_silence},
+    {"three_idle_hubs", [] { return ring(3); }, play_idle},
     {"pictures_of_a_slow_link", [] { return chain(2, kPictureDelayMs, kPictureRate); },
      play_pictures},
     {"hub_that_began_anew_stays", plan_minute, play_minute},

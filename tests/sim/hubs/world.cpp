@@ -32,7 +32,7 @@ World::World(const Options& options)
     machines_.push_back(std::move(machine));
   }
   if (plan_.collisions) census_.note(plan_.copied ? Event::copied_state : Event::id_collision);
-  for (const WirePlan& each : plan_.wires) wires_.push_back({each, {}, true, {}});
+  for (const WirePlan& each : plan_.wires) wires_.push_back({each, {}, true, 0, {}});
   const SimNode::Around around{random_, book_, census_};
   for (const NodePlan& each : plan_.nodes) nodes_.emplace_back(around, each, false);
   for (std::size_t hub = 0; hub < machines_.size(); ++hub)

@@ -34,6 +34,7 @@ struct Wire {
   WirePlan plan;
   std::array<bool, 2> cut{};  ///< nothing passes that way, from the dialler and to it
   bool wanted = true;
+  std::uint64_t frames = 0;  ///< that were written to it, both ways
   /// The place at either end, in that life of its hub, and the line on which its counts began.
   struct Counted {
     std::uint64_t life = 0;
