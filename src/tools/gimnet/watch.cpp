@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdio>
 #include <ctime>
+#include <tuple>
 #include <utility>
 
 #include "base/clock.hpp"
@@ -60,6 +61,29 @@ std::string service_words(const ServiceRecord& service) {
   return printable(words);
 }
 
+std::string difference(const NodeRecord& before, const NodeRecord& now) {
+  std::string words;
+  if (before.description != now.description)
+    words += " description " + (before.description.empty() ? "none" : before.description);
+  if (before.place != now.place) words += " place " + before.place;
+  if (before.connected != now.connected) words += before.connected ? " connected" : " away";
+  if (before.services != now.services) words += " services " + std::to_string(before.services);
+  return words;
+}
+
+std::string difference(const ServiceRecord& before, const ServiceRecord& now) {
+  std::string words;
+  if (before.node.id != now.node.id) words += " node " + before.node.text();
+  if (before.metadata != now.metadata)
+    words += " metadata " + (before.metadata.empty() ? "none" : before.metadata);
+  const auto terms = [](const ServiceRecord& each) {
+    return std::tuple(each.key.type, each.key.instance, each.direction, each.delivery, each.window,
+                      each.retain);
+  };
+  if (terms(before) != terms(now)) words += " other terms";
+  return words;
+}
+
 // Of what is gone the hub tells only who it was (docs/protocol.md, section 8): nothing else is said
 // here.
 void write_node(JsonWriter& json, const WatchEvent& event, const HubWays& ways) {
@@ -112,6 +136,29 @@ std::string_view HubWays::standing_of(const NodeRecord& node) const {
   return hub == reachable_.end() || hub->second ? "away" : kUnreachable;
 }
 
+std::string WatchMemory::take(const WatchEvent& event) {
+  if (event.change == Change::snapshot_begins) {
+    nodes_.clear();
+    services_.clear();
+  }
+  std::string before;
+  const auto note = [&]<class Record>(auto& records, const auto& key, const Record& now,
+                                      bool gone) {
+    const auto known = records.find(key);
+    if (event.change == Change::changed && known != records.end())
+      before = difference(known->second, now);
+    if (gone) {
+      records.erase(key);
+    } else {
+      records[key] = now;
+    }
+  };
+  if (event.node) note(nodes_, event.node->node.id, *event.node, event.change == Change::left);
+  if (event.service)
+    note(services_, event.service->name, *event.service, event.change == Change::withdrawn);
+  return before.empty() ? before : ", before:" + before;
+}
+
 bool is_snapshot(Change change) {
   return change == Change::snapshot_begins || change == Change::present ||
          change == Change::snapshot_ends;
@@ -131,12 +178,13 @@ std::string json_line(const WatchEvent& event, std::int64_t now_ns, const HubWay
 }
 
 std::string text_line(const WatchEvent& event, std::int64_t now_ns, Paint paint,
-                      const HubWays& ways) {
+                      const HubWays& ways, std::string_view before) {
   if (!event.node && !event.service) return {};
   std::string words =
       event.node ? node_words(*event.node, event.former_name) : service_words(*event.service);
   if (event.node && event.change == Change::present && !event.node->connected)
     words += ", " + std::string(ways.standing_of(*event.node));
+  words += printable(std::string(before));
   return paint(line_of(now_ns, std::string(change_text(event.change)), words),
                tone_of(event.change)) +
          "\n";
@@ -176,10 +224,12 @@ class WatchPrinter {
     if (!options.all && filter_.hides(event)) return false;
     if (event.node) hubs_.insert(event.node->hub_id);
     if (event.service) hubs_.insert(hub_of(NodeId{event.service->node.id}).value());
+    const std::string before = memory_.take(event);
     if (options.changes && is_snapshot(event.change)) return false;
     const std::int64_t now_ns = wall_now_ns();
-    session_.output().write(options.json ? json_line(event, now_ns, ways_)
-                                         : text_line(event, now_ns, session_.paint(), ways_));
+    session_.output().write(options.json
+                                ? json_line(event, now_ns, ways_)
+                                : text_line(event, now_ns, session_.paint(), ways_, before));
     return event.node.has_value() || event.service.has_value();
   }
 
@@ -202,6 +252,7 @@ class WatchPrinter {
   ToolSession& session_;
   ToolFilter filter_;
   HubWays ways_;
+  WatchMemory memory_;
   std::set<std::uint32_t> hubs_;  ///< of nodes and services that match
   std::int64_t next_look_ns_ = 0;
 };

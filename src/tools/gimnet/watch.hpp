@@ -40,15 +40,29 @@ class HubWays {
   std::map<std::uint32_t, bool> reachable_;
 };
 
+/// The last words of a watch about each node and service, so that a line can say what changed.
+/// Thread safety: one thread. Memory: a record for each that is there.
+class WatchMemory {
+ public:
+  /// To be told each event. Of one that is `changed`: what was different before, such as ", before:
+  /// metadata x"; "" if nothing is known.
+  [[nodiscard]] std::string take(const WatchEvent& event);
+
+ private:
+  std::map<std::uint32_t, NodeRecord> nodes_;
+  std::map<std::string, ServiceRecord> services_;
+};
+
 /// Is it part of what was there before, not a change?
 [[nodiscard]] bool is_snapshot(Change change);
 
 /// An object and a newline. `now_ns`: wall_now_ns() when it came.
 [[nodiscard]] std::string json_line(const WatchEvent& event, std::int64_t now_ns,
                                     const HubWays& ways = {});
-/// A line for people, in local time; "" for what they need not see.
+/// A line for people, in local time; "" for what they need not see. `before`: of WatchMemory.
 [[nodiscard]] std::string text_line(const WatchEvent& event, std::int64_t now_ns,
-                                    Paint paint = Paint{}, const HubWays& ways = {});
+                                    Paint paint = Paint{}, const HubWays& ways = {},
+                                    std::string_view before = {});
 /// The same of a hub to which a way came or went.
 [[nodiscard]] std::string json_line(const NetworkHub& hub, std::int64_t now_ns);
 [[nodiscard]] std::string text_line(const NetworkHub& hub, std::int64_t now_ns,

@@ -103,6 +103,38 @@ TEST(WatchReport, KnowsWhatWasThereBefore) {
   EXPECT_FALSE(is_snapshot(Change::joined));
 }
 
+TEST(WatchMemory, TellsWhatWasDifferentBeforeAChange) {
+  WatchMemory memory;
+  WatchEvent event;
+  event.change = Change::changed;
+  event.service.emplace();
+  event.service->name = "robot/odom";
+  event.service->node = Peer{(7u << 20) | 17};
+  event.service->metadata = "slow";
+  EXPECT_EQ(memory.take(event), "") << "it was not known";
+  event.service->metadata = "fast";
+  event.service->node = Peer{(7u << 20) | 18};
+  const std::string before = memory.take(event);
+  EXPECT_EQ(before, ", before: node 7.17 metadata slow");
+  EXPECT_EQ(text_line(event, kNoon, Paint{}, {}, before),
+            "12:34:56.789  changed      service robot/odom of 7.18, fast, before: node 7.17 "
+            "metadata slow\n");
+  event.change = Change::withdrawn;
+  EXPECT_EQ(memory.take(event), "");
+  event.change = Change::changed;
+  EXPECT_EQ(memory.take(event), "") << "it was gone";
+  event.service->retain = true;
+  EXPECT_EQ(memory.take(event), ", before: other terms");
+  WatchEvent node = node_event(Change::joined, 17, "robot", "");
+  EXPECT_EQ(memory.take(node), "");
+  node.change = Change::changed;
+  node.node->description = "new";
+  EXPECT_EQ(memory.take(node), ", before: description none");
+  EXPECT_EQ(memory.take(WatchEvent{}), "") << "a snapshot begins";
+  node.node->description = "newer";
+  EXPECT_EQ(memory.take(node), "");
+}
+
 TEST(ToolFilter, HidesTheWholeLifeOfALook) {
   ToolFilter filter;
   EXPECT_TRUE(filter.hides(node_event(Change::joined, 1, "", kToolDescription)));
