@@ -200,6 +200,11 @@ class Moves(Case):
             return found and found[0]["id"] != held["id"]
 
         wait_until(is_back, "the robot at the second hub")
+        self.first = self.first.again(self)
+        wait_until(lambda: run_gimnet(self.second, "status", "--hub-id", "1").code == 0, "the first hub again")
+        for hub in (self.first, self.second):
+            wait_until(lambda hub=hub: [node["hub_id"] for node in hub.nodes() if node["name"] == "robot"] == [2],
+                       "the robot once, and not where it was, before the grace time", 20)
         sent = run_gimnet(f"tcp://127.0.0.1:1,{self.second.url}", "send", "robot", data=b"two\n")
         self.assertEqual(sent.code, 0, sent.err)
         self.assertEqual((receiver.wait(), receiver.out), (0, b"one\ntwo\n"), receiver.err)

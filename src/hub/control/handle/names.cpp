@@ -30,6 +30,7 @@ Result<ns::ListAnswer, proto::Refusal> list(const HandlerContext& context, const
       [&](const KnownName& known) -> std::optional<ns::NodeRecord> {
         if (pattern && !pattern->matches(known.name)) return std::nullopt;
         if (wanted.connected_only && known.standing != ns::NameStanding::held) return std::nullopt;
+        if (is_replaced(context, known)) return std::nullopt;
         return node_record_of(known);
       },
       [&](std::uint32_t after) {

@@ -10,6 +10,16 @@
 
 namespace gimnet::hub {
 
+/// A claim that a hub made before it was started again, to a name that another node has by now. It
+/// is listed no more.
+[[nodiscard]] inline bool is_replaced(const HandlerContext& context, const KnownName& known) {
+  if (known.standing != proto::ns::NameStanding::unreachable || known.claim->version != 0)
+    return false;
+  const auto best = context.names->copies()->find(known.name);
+  return best && best->claim->node != known.claim->node &&
+         best->standing == proto::ns::NameStanding::held;
+}
+
 /// One page of a listing over all hubs: this hub's own records among those of the others, by
 /// ascending id, in a bounded piece of work. Thread safety: none.
 template <class Id, class Record>

@@ -148,6 +148,7 @@ Result<ns::ServicesAnswer, proto::Refusal> services(const HandlerContext& contex
       [](const NameCopies& names, GroupId after) { return names.group_after(after); },
       [&](const KnownName& known) -> std::optional<ns::ServiceRecord> {
         if (pattern && !pattern->matches(known.name)) return std::nullopt;
+        if (is_replaced(context, known)) return std::nullopt;
         ns::ServiceRecord record = service_record_of(known);
         if (const Topic* topic = own.find(record.name)) {
           record.subscribers = topic->subscriber_count();
