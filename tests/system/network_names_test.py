@@ -179,8 +179,9 @@ class Moves(Case):
             else:
                 lost = came.wait(lambda got: got.kind == NS and got.body[:4] == b"\x24\0\0\0")
                 self.assertEqual(fields(lost.body[4:])[4], robot.id)
-                self.assertIn("has the name, since its claim has rank 65536, and the one of this hub 65535", self.first.process.err)
-                self.assertIn("that hub is reached over the link to hub 2", self.first.process.err)
+                for words in ("has the name, since its claim has rank 65536, and the one of this hub 65535",
+                              "that hub is reached over the link to hub 2"):
+                    wait_until(lambda words=words: words in self.first.process.err, f"a line with {words}")
                 self.assertEqual(self.holder(watcher, name), robot.id)
                 self.assertEqual(fields(self.viewer.ask(NS, 4, put(3, U32, robot.id)))[3], name)
             watcher.leave()
