@@ -93,6 +93,7 @@ std::uint64_t RequestBook::ended_later(gimi_handle pending, gimi_status status, 
 void RequestBook::note(std::uint64_t number, gimi_status status, gimi_ran ran) {
   Entry& entry = entries_.at(number);
   entry.said_no |= ran == GIMI_RAN_NO;
+  if (ran == GIMI_RAN_NO) entry.words = gimi_error_text();
   entry.said_yes |= ran == GIMI_RAN_YES;
   ++counts_[{status, ran}];
 }
@@ -103,7 +104,7 @@ std::string RequestBook::check() {
     const Entry& entry = entries_[number];
     EXPECT_LE(entry.ends, 1u) << "request " << number << " ended twice";
     EXPECT_FALSE(entry.said_no && entry.taken != 0)
-        << "request " << number << " was done, and said that it was not";
+        << "request " << number << " was done, and said that it was not: " << entry.words;
     EXPECT_FALSE(entry.said_yes && entry.taken == 0)
         << "request " << number << " was not done, and said that it was";
     if (!entry.repeat) {

@@ -91,6 +91,7 @@ class RequestBook {
     std::uint32_t taken = 0;
     std::uint32_t ends = 0;
     bool said_no = false;  ///< that nobody did it
+    std::string words;     ///< with that
     bool said_yes = false;
   };
   void note(std::uint64_t number, gimi_status status, gimi_ran ran);
