@@ -66,9 +66,9 @@ GIMNET_API gimi_status gimi_join(const gimi_node_options* options, gimi_handle* 
  * gimi_lost(), until gimi_close(). */
 GIMNET_API gimi_status gimi_leave(gimi_handle node);
 /** Ends a handle of any kind; of a node, leaves first. The end of a publisher, subscription,
- * accepted service or watch asks the hub and waits for its answer, a second at most. Calls that
- * wait in it to receive answer GIMI_CLOSED; others end as they would have. GIMI_CLOSED: no such
- * handle, and nothing was done. */
+ * accepted service or watch asks the hub and waits for its answer, a second at most, and first for
+ * calls of other threads that ask it with the same node. Calls that wait in it to receive answer
+ * GIMI_CLOSED; others end as they would have. GIMI_CLOSED: no such handle, and nothing was done. */
 GIMNET_API gimi_status gimi_close(gimi_handle handle);
 /** The own id; 0: no such node, or it left. */
 GIMNET_API gimi_peer gimi_id(gimi_handle node);
