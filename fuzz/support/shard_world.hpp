@@ -50,9 +50,9 @@ struct Node {
 class ShardWorld {
  public:
   ShardWorld()
-      : shared_{kHub,        limits_,      nodes_,           groups_, routes_,
-                quiescence_, budget_,      retained_budget_, inbox_,  {&mailbox_},
-                {&waker_},   {&counters_}, {&sessions_}},
+      : shared_{kHub,        limits_,   nodes_,       groups_,          routes_,
+                quiescence_, budget_,   link_budget_, retained_budget_, inbox_,
+                {&mailbox_}, {&waker_}, {&counters_}, {&sessions_}},
         shard_(std::make_unique<IoShard>(ShardIndex{0}, shared_, IoShard::Options{})) {
     for (std::uint32_t i = 0; i < 2; ++i) {
       node_[i].id = make_id<NodeId>(kHub, i + 1);
@@ -240,6 +240,7 @@ class ShardWorld {
   RouteTable routes_;
   Quiescence quiescence_{1};
   Budget budget_{limits_.budget_bytes};
+  Budget link_budget_{limits_.link_budget_bytes};
   Budget retained_budget_{limits_.retained_budget_bytes};
   ControlInbox inbox_{1};
   Waker waker_;

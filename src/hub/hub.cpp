@@ -86,6 +86,7 @@ struct SharedParts {
   explicit SharedParts(const HubOptions& options)
       : quiescence(options.shards),
         budget(options.limits.budget_bytes, options.shards),
+        link_budget(options.limits.link_budget_bytes, options.shards),
         retained_budget(options.limits.retained_budget_bytes),
         inbox(options.shards) {
     // As many as a reload may allow: what is not used costs nothing.
@@ -110,6 +111,7 @@ struct SharedParts {
                      .routes = routes,
                      .quiescence = quiescence,
                      .budget = budget,
+                     .link_budget = link_budget,
                      .retained_budget = retained_budget,
                      .inbox = inbox,
                      .mailboxes = {},
@@ -128,6 +130,7 @@ struct SharedParts {
   RouteTable routes;
   Quiescence quiescence;
   Budget budget;
+  Budget link_budget;
   Budget retained_budget;
   ControlInbox inbox;
   std::vector<std::unique_ptr<Waker>> wakers;

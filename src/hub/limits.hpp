@@ -47,6 +47,7 @@ struct Limits {
   std::uint64_t control_bytes = 256 * 1024;
   std::uint64_t reserve_bytes = 1ull << 20;
   std::uint64_t budget_bytes = 256ull << 20;
+  std::uint64_t link_budget_bytes = 256ull << 20;
   std::uint64_t lane0_bytes_per_s = 64ull << 20;
   std::uint64_t block_ms = 5'000;
   std::uint64_t slow_consumer_ms = 10'000;

@@ -7,6 +7,7 @@
 
 namespace gimnet::hub {
 
+class BudgetLease;
 class BufferPool;
 
 /// Memory that a Buffer has before its bytes.
@@ -32,8 +33,8 @@ struct Buffer {
   std::uint32_t references = 0;
   BufferKind kind = BufferKind::chunk;
   std::uint8_t size_class = 0;
-  bool pinned = false;  ///< counted against the budget, because a waiting frame keeps it
   BufferPool* pool = nullptr;
+  BudgetLease* payer = nullptr;  ///< that it counts against, because a waiting frame keeps it
   Buffer* next_free = nullptr;
   Buffer* lender = nullptr;            ///< of a foreign buffer: what it stands for
   std::atomic<std::uint32_t> lent{0};  ///< foreign buffers and mailbox entries that stand for it

@@ -119,18 +119,17 @@ void BufferPool::end_loan(Buffer* lent) {
       1, std::memory_order_release);  // pairs with the acquire loads in recycle(), take_back_lent()
 }
 
-void BufferPool::pin(Buffer& buffer) {
-  if (buffer.pinned) return;
-  buffer.pinned = true;
+void BufferPool::pin(Buffer& buffer, BudgetLease& payer) {
+  if (buffer.payer != nullptr) return;
+  buffer.payer = &payer;
   pinned_bytes_ += kBufferRoom + buffer.capacity;
-  budget_.take(kBufferRoom + buffer.capacity);
+  payer.take(kBufferRoom + buffer.capacity);
 }
 
 void BufferPool::unpin(Buffer& buffer) {
-  if (!buffer.pinned) return;
-  buffer.pinned = false;
+  if (buffer.payer == nullptr) return;
   pinned_bytes_ -= kBufferRoom + buffer.capacity;
-  budget_.give_back(kBufferRoom + buffer.capacity);
+  std::exchange(buffer.payer, nullptr)->give_back(kBufferRoom + buffer.capacity);
 }
 
 void BufferPool::recycle(Buffer& buffer) {

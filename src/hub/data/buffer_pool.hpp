@@ -45,9 +45,8 @@ class BufferPool {
   [[nodiscard]] BufferRef adopt(Buffer* lent);
   static void end_loan(Buffer* lent);
 
-  /// Counts the buffer against the budget until it is free again; once, however many frames keep
-  /// it.
-  void pin(Buffer& buffer);
+  /// Counts the buffer against `payer` until it is free again; once, however many frames keep it.
+  void pin(Buffer& buffer, BudgetLease& payer);
   /// No waiting frame keeps it any more, though somebody else does.
   void unpin(Buffer& buffer);
   [[nodiscard]] std::uint64_t pinned_bytes() const { return pinned_bytes_; }

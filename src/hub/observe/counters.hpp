@@ -94,7 +94,7 @@ struct alignas(64) ShardCounters {
   Counter lane0_demoted;  ///< frames
   Counter bad_credits;  ///< CREDITs for no subscription of the node, or with a total that cannot be
   Counter not_retained;  ///< messages of retained services that were not kept
-  Counter scarce_turns;  ///< that began with less than a third of the budget free
+  Counter scarce_turns;  ///< that began with less than a third of a budget free
   Counter pinned_bytes;  ///< kept from being freed by waiting frames, now
   Counter pinned_bytes_max;
   Counter allocated_bytes;  ///< by the shard's thread since it began

@@ -95,6 +95,7 @@ Connection& Attacher::session_of(const AttachCommand& command) {
   connection->node = command.node;
   connection->slot = command.session.slot;
   connection->generation = command.session.generation;
+  if (connection->is_link()) connection->outbox.set_link();
   connection->outbox.set_counters(state_.sessions.begin(connection->slot, connection->generation));
   state_.recipients.put(*connection);
   state_.counters.sessions.add(1);

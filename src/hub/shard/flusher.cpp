@@ -76,8 +76,9 @@ void Flusher::flush(Connection& connection) {
   if (const bool must_confirm = result == Flush::waits; must_confirm != connection.must_confirm) {
     connection.must_confirm = must_confirm;
     state_.signals.arm(connection);
-    if (must_confirm && state_.budget.scarce()) ask_for_confirm(connection);
-  } else if (must_confirm && sent_data && state_.budget.scarce()) {
+    if (must_confirm && connection.outbox.budget(state_.egress).scarce())
+      ask_for_confirm(connection);
+  } else if (must_confirm && sent_data && connection.outbox.budget(state_.egress).scarce()) {
     ask_for_confirm(connection);
   }
   connection.sent_bytes += sent;

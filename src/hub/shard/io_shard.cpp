@@ -139,6 +139,7 @@ void IoShard::turn(std::span<const Ready> ready, std::uint64_t now_ms) {
   state_.egress.now_wall_ns = wall_now_ns();
   state_.shared.quiescence.enter(state_.self.value());
   state_.budget.begin_turn(now_ms);
+  if (!state_.recipients.links().empty()) state_.link_budget.begin_turn(now_ms);
   take_commands();
   take_mail();
   keeper_.look_for_others();
@@ -240,7 +241,7 @@ void IoShard::flush() { flush_again_ = flusher_.flush_dirty(); }
 void IoShard::finish_turn() {
   state_.counters.turns.add(1);
   state_.counters.mailbox_wakeups.add(state_.fanout.take_wakeups());
-  if (state_.budget.scarce()) state_.counters.scarce_turns.add(1);
+  if (state_.is_scarce()) state_.counters.scarce_turns.add(1);
   state_.counters.pinned_bytes.store(state_.pool.pinned_bytes());
   state_.counters.pinned_bytes_max.raise_to(state_.pool.pinned_bytes());
   state_.counters.allocated_bytes.store(meter_.bytes());

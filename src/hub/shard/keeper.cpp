@@ -14,7 +14,8 @@ void Keeper::tick() {
   const std::uint64_t late_ms = state_.now_ms - next_tick_at_ms_;
   next_tick_at_ms_ = state_.now_ms + kTickMs;
   state_.pool.take_back_lent();
-  if (state_.budget.scarce()) state_.pool.free_kept();
+  state_.link_budget.begin_turn(state_.now_ms);  // also once the last link has gone
+  if (state_.is_scarce()) state_.pool.free_kept();
   const bool says_again = state_.now_ms >= say_again_at_ms_;
   if (says_again) say_again_at_ms_ = state_.now_ms + kSayAgainMs;
   for (const std::unique_ptr<Connection>& connection : state_.connections) {

@@ -36,6 +36,7 @@ struct HubShared {
   const RouteTable& routes;
   Quiescence& quiescence;
   Budget& budget;
+  Budget& link_budget;
   Budget& retained_budget;
   ControlInbox& inbox;
   std::vector<Mailbox*> mailboxes;       ///< by shard
@@ -56,8 +57,10 @@ struct ShardState {
   SessionGauges& sessions;
   Tally tally;
   BudgetLease budget;
+  BudgetLease link_budget;
   BufferPool pool;
   PiecePool pieces;
+  PiecePool link_pieces;
   DropBook drops;
   Signals signals;
   EgressContext egress;
@@ -91,6 +94,7 @@ struct ShardState {
                ? connection
                : nullptr;
   }
+  [[nodiscard]] bool is_scarce() const { return budget.scarce() || link_budget.scarce(); }
   /// The next turn goes on with the connection, whatever the poller says.
   void go_on_later(Connection& connection) {
     if (!std::exchange(connection.goes_on, true)) with_rest.push_back(connection.token());

@@ -60,8 +60,8 @@ TEST_F(BufferPoolTest, ASharedChunkIsAsMuchMemoryAsTheAllocatorGives) {
 TEST_F(BufferPoolTest, PinsABufferOnceUntilItIsFree) {
   BufferRef slab = pool.take_slab();
   const std::uint64_t memory = kBufferRoom + slab->capacity;
-  pool.pin(*slab.get());
-  pool.pin(*slab.get());
+  pool.pin(*slab.get(), lease);
+  pool.pin(*slab.get(), lease);
   EXPECT_EQ(pool.pinned_bytes(), memory);
   const BufferRef second = slab.share();
   slab.reset();
@@ -74,10 +74,25 @@ TEST_F(BufferPoolTest, PinsABufferOnceUntilItIsFree) {
 TEST_F(BufferPoolTest, AFreedPinIsGivenBack) {
   {
     const BufferRef slab = pool.take_slab();
-    pool.pin(*slab.get());
+    pool.pin(*slab.get(), lease);
   }
   EXPECT_EQ(pool.pinned_bytes(), 0u);
-  EXPECT_FALSE(pool.take_slab()->pinned);
+  EXPECT_EQ(pool.take_slab()->payer, nullptr);
+}
+
+TEST_F(BufferPoolTest, TheFirstPayerPaysUntilTheBufferIsFree) {
+  Budget links{4ull << 20};
+  BudgetLease link_lease{links};
+  {
+    const BufferRef slab = pool.take_slab();
+    pool.pin(*slab.get(), link_lease);
+    pool.pin(*slab.get(), lease);
+    EXPECT_LT(links.left(), links.total());
+    EXPECT_EQ(budget.left(), budget.total());
+    EXPECT_EQ(pool.pinned_bytes(), kBufferRoom + slab->capacity) << "counted once";
+  }
+  EXPECT_EQ(links.left() + 2 * links.piece_bytes(), links.total()) << "all but what a shard keeps";
+  EXPECT_EQ(budget.left(), budget.total());
 }
 
 TEST_F(BufferPoolTest, ALentSlabIsNotReusedBeforeItsLoanEnds) {
@@ -157,7 +172,7 @@ TEST_F(BufferPoolTest, ASlabThatIsBorrowedOftenIsPinnedOnce) {
   std::vector<BufferRef> borrowed;
   for (int i = 0; i < 100; ++i) {
     borrowed.push_back(other.adopt(BufferPool::lend(*slab.get())));
-    other.pin(*borrowed.back().get());
+    other.pin(*borrowed.back().get(), other_lease);
   }
   EXPECT_EQ(other.pinned_bytes(), kBufferRoom + slab->capacity);
   borrowed.clear();
@@ -181,7 +196,7 @@ TEST_F(BufferPoolTest, AnExactChunkIsFreedAfterItsUse) {
     const BufferRef chunk = pool.take_exact(20'000);
     EXPECT_EQ(chunk->capacity, 20'000u);
     EXPECT_EQ(chunk->kind, BufferKind::chunk);
-    pool.pin(*chunk.get());
+    pool.pin(*chunk.get(), lease);
     EXPECT_EQ(pool.pinned_bytes(), 20'000u + kBufferRoom);
   }
   EXPECT_EQ(pool.pinned_bytes(), 0u);

@@ -88,5 +88,33 @@ TEST(ScarceMemory, AConnectionWaitsAloneForItsShare) {
   rig.state(0).budget.give_back(kTaken);
 }
 
+// Each has a budget of its own: whatever waits for the ones, the others have whole lanes.
+TEST(ScarceMemory, OfLinksIsNotThatOfNodes) {
+  constexpr HubId kFirst{20};
+  for (const bool links_are_full : {true, false}) {
+    Limits limits;
+    (links_are_full ? limits.link_budget_bytes : limits.budget_bytes) = 4 << 20;
+    HubRig rig(1, limits);
+    FakeNode& a = rig.join(0);
+    const auto flood = [&](bool link, std::uint8_t lane, std::uint16_t number) {
+      const HubId hub{static_cast<std::uint16_t>(kFirst.value() + number)};
+      FakeNode& to = link ? rig.link(0, hub) : rig.join(0);
+      to.pipe.set_room(0);
+      const std::uint32_t dst = link ? make_id<NodeId>(hub, 1).value() : to.id.value();
+      for (int i = 0; i < 150; ++i)
+        rig.send(a, dst, std::string(10'000, 'x'), {.flags = 2, .lane = lane});
+      rig.settle_without_reading();
+      return rig.counts(to).dropped;
+    };
+    std::uint64_t lost = 0;
+    for (std::uint16_t i = 0; i < 4; ++i) lost += flood(links_are_full, 1, i);
+    EXPECT_GT(lost, 0u);
+    EXPECT_EQ(rig.dropped(DropReason::over_budget), lost);
+    EXPECT_EQ(rig.state(0).link_budget.scarce(), links_are_full);
+    EXPECT_EQ(rig.state(0).budget.scarce(), !links_are_full);
+    for (std::uint16_t i = 4; i < 8; ++i) EXPECT_EQ(flood(!links_are_full, 1, i), 0u);
+  }
+}
+
 }  // namespace
 }  // namespace gimnet::hub

@@ -24,6 +24,7 @@ SimHub::SimHub(Setup setup, Around around)
     : setup_(std::move(setup)),
       wall_now_ns_(around.wall_now_ns),
       budget_(setup_.limits.budget_bytes),
+      link_budget_(setup_.limits.link_budget_bytes),
       retained_budget_(setup_.limits.retained_budget_bytes),
       mailbox_(1, hub::Mailbox::bounds_from(setup_.limits), waker_),
       sessions_(kGaugedSlots),
@@ -35,9 +36,9 @@ SimHub::SimHub(Setup setup, Around around)
 SimHub::~SimHub() { shard_.let_go(); }
 
 hub::HubShared SimHub::shared() {
-  return {setup_.facts.id, setup_.limits, nodes_,           groups_, routes_,
-          quiescence_,     budget_,       retained_budget_, inbox_,  {&mailbox_},
-          {&waker_},       {&counters_},  {&sessions_}};
+  return {setup_.facts.id, setup_.limits, nodes_,       groups_,          routes_,
+          quiescence_,     budget_,       link_budget_, retained_budget_, inbox_,
+          {&mailbox_},     {&waker_},     {&counters_}, {&sessions_}};
 }
 
 hub::Conductor::Wiring SimHub::wiring(Around around) {

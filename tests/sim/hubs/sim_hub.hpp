@@ -101,6 +101,7 @@ class SimHub {
   hub::RouteTable routes_;
   hub::Quiescence quiescence_{1};
   hub::Budget budget_;
+  hub::Budget link_budget_;
   hub::Budget retained_budget_;
   hub::ControlInbox inbox_{1};
   hub::Waker waker_;

@@ -31,18 +31,17 @@ void OpenRun::open(LaneQueue& of, const CopyChunk& chunk, std::uint64_t bytes_ma
   entry = &last;
 }
 
-Run CopyChunk::copy(const Run& run, bool waits, EgressContext& context) {
-  if (context.budget.scarce() && run.size >= BufferPool::kExactBytesMin)
-    return copy_alone(run, context);
+Run CopyChunk::copy(const Run& run, bool waits, BudgetLease& budget, EgressContext& context) {
+  if (run.size >= BufferPool::kExactBytesMin && budget.scarce()) return copy_alone(run, context);
   if (!chunk_ || chunk_->capacity - used_ < run.size) {
     // A large one saves entries and calls where there is room; where there is little, each outbox
     // takes what it must.
-    const bool little = context.budget.scarce() || context.budget.exhausted();
+    const bool little = budget.scarce() || budget.exhausted();
     next_bytes_ = little ? 0 : std::clamp(kGrowth * next_bytes_, kFirstBytes, kSharedChunkBytes);
     chunk_ = context.pool.take_chunk(std::max(run.size, next_bytes_));
     used_ = 0;
     // At once where something waits: by the end of the turn many outboxes may have begun one.
-    if (waits) context.pool.pin(*chunk_.get());
+    if (waits) context.pool.pin(*chunk_.get(), budget);
   }
   std::byte* place = chunk_->data + used_;
   std::memcpy(place, run.bytes, run.size);

@@ -68,8 +68,9 @@ struct OpenRun {
 /// chunk, as each copy has one.
 class CopyChunk {
  public:
-  /// `waits`: something waits in the outbox, so that the copy may stay there for long.
-  [[nodiscard]] Run copy(const Run& run, bool waits, EgressContext& context);
+  /// `waits`: something waits in the outbox, so that the copy may stay there for long, and counts
+  /// against `budget`.
+  [[nodiscard]] Run copy(const Run& run, bool waits, BudgetLease& budget, EgressContext& context);
   /// Is it in this chunk?
   [[nodiscard]] bool holds(const Run& run) const { return run.buffer.get() == chunk_.get(); }
   /// The place of the next copy, and the room there. REQUIRES: a copy is in it.

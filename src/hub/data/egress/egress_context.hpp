@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <thread>
 
@@ -41,6 +42,14 @@ class OwnerThread {
 #endif
 };
 
+/// Are frames in that buffer copied before they wait at the cost of `budget`? Small ones are, and
+/// all while memory is scarce, unless they lie in a chunk; and those in a buffer that the other
+/// budget pays for, or it would pay for what waits here.
+[[nodiscard]] inline bool must_copy(const Buffer& buffer, bool small, const BudgetLease& budget) {
+  if (buffer.payer != nullptr && buffer.payer != &budget) return true;
+  return (small || budget.scarce()) && buffer.kind != BufferKind::chunk;
+}
+
 /// Reaches the senders that fill an outbox, on whatever shard they are. Called only when a queue is
 /// full or has room again, never per frame.
 class SenderSignals {
@@ -54,12 +63,17 @@ class SenderSignals {
   virtual void release(NodeId sender) = 0;
 };
 
+/// The memory of what waits for one sort of connection: nodes, or links. Thread safety: one shard.
+struct WaitingMemory {
+  BudgetLease& budget;
+  PiecePool& pieces;
+};
+
 /// The parts that all outboxes of a shard share. Thread safety: one shard.
 struct EgressContext {
   const Limits& limits;
   BufferPool& pool;
-  PiecePool& pieces;
-  BudgetLease& budget;
+  std::array<WaitingMemory, 2> memory;  ///< of nodes, of links
   Tally& tally;
   DropBook& drops;
   SenderSignals& signals;

@@ -194,7 +194,7 @@ void GatherWriter::owe(std::size_t lane, std::uint32_t bytes,
 std::uint32_t GatherWriter::allowed(const Run& run, std::size_t planned, Job& job) {
   if (job.resume == nullptr) return run.size;
   const CountedGroups* counted = job.outbox.counted_groups();
-  const std::uint64_t most = resume_bytes_most(job.context.budget);
+  const std::uint64_t most = resume_bytes_most(job.outbox.budget(job.context));
   if (job.resume->make_room(planned, run.size, counted, most)) return run.size;
   std::uint32_t size = 0;
   for (std::uint32_t frame = 0; frame < run.frames; ++frame) {
@@ -301,7 +301,7 @@ void GatherWriter::finish(Run run, bool control, bool shared, Job& job) {
     tally.queued -= run.frames;
     return;
   }
-  if (job.context.budget.scarce()) return keep_in_pieces(std::move(run), shared, job);
+  if (job.outbox.budget(job.context).scarce()) return keep_in_pieces(std::move(run), shared, job);
   job.outbox.settle_run(run, shared, job.context);
   job.resume->wrote(std::move(run));
 }

@@ -6,12 +6,12 @@
 
 namespace gimnet::hub {
 
-void KeptMessage::append(const Run& frame, bool shared, EgressContext& context) {
+void KeptMessage::append(const Run& frame, bool shared, BudgetLease& budget,
+                         EgressContext& context) {
   const bool small = frame.size < kCopyBytesMax && !shared;
-  const bool by_copy =
-      (small || context.budget.scarce()) && frame.buffer->kind != BufferKind::chunk;
-  Run piece = by_copy ? copy(frame, context) : frame.share();
-  context.pool.pin(*piece.buffer.get());
+  const bool by_copy = must_copy(*frame.buffer.get(), small, budget);
+  Run piece = by_copy ? copy(frame, budget.scarce(), context) : frame.share();
+  context.pool.pin(*piece.buffer.get(), budget);
   add(std::move(piece));
 }
 
@@ -26,10 +26,10 @@ void KeptMessage::add(Run piece) {
   }
 }
 
-Run KeptMessage::copy(const Run& frame, EgressContext& context) {
+Run KeptMessage::copy(const Run& frame, bool scarce, EgressContext& context) {
   if (!chunk_ || chunk_->capacity - chunk_used_ < frame.size) {
     // The frames of a large message share chunks; a small message takes what it needs.
-    const bool exact = context.budget.scarce() && frame.size >= BufferPool::kExactBytesMin;
+    const bool exact = scarce && frame.size >= BufferPool::kExactBytesMin;
     chunk_ = exact ? context.pool.take_exact(frame.size)
                    : context.pool.take_chunk(frames_ == 0 ? frame.size : kCopyBytesMax);
     chunk_used_ = 0;

@@ -10,7 +10,7 @@ namespace gimnet::hub {
 
 /// One message that is kept, whole or as far as it came: references to its frames, and small ones
 /// in memory of their own, so that they do not keep a read buffer. What append() keeps counts
-/// against the budget. Cleared and filled again it does not allocate. Thread safety: one shard.
+/// against a budget. Cleared and filled again it does not allocate. Thread safety: one shard.
 class KeptMessage {
  public:
   KeptMessage() = default;
@@ -21,8 +21,9 @@ class KeptMessage {
   [[nodiscard]] std::uint32_t frames() const { return frames_; }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
 
-  /// The next frame. `shared`: others keep the same bytes, so a reference costs nothing.
-  void append(const Run& frame, bool shared, EgressContext& context);
+  /// The next frame. `shared`: others keep the same bytes, so a reference costs nothing. What is
+  /// kept counts against `budget`.
+  void append(const Run& frame, bool shared, BudgetLease& budget, EgressContext& context);
   /// Begins a message that is copied into memory of its own, about `bytes` of it, by
   /// append_copy(). It does not count against the budget. Memory of the message before is used
   /// again where it fits.
@@ -45,7 +46,7 @@ class KeptMessage {
   /// So much memory of its own a message keeps for the next one, however small that is.
   static constexpr std::uint32_t kOwnRoomBytes = 4 * 1024;
 
-  [[nodiscard]] Run copy(const Run& frame, EgressContext& context);
+  [[nodiscard]] Run copy(const Run& frame, bool scarce, EgressContext& context);
   [[nodiscard]] Run copy_into_chunk(const Run& frame, EgressContext& context);
   void add(Run piece);
 

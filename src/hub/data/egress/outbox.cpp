@@ -33,12 +33,12 @@ void Outbox::note_waiting(EgressContext& context) {
   const bool waits = held_bytes() != 0;
   if (waits == waits_) return;
   waits_ = waits;
-  waits ? context.budget.begin_waiting() : context.budget.end_waiting();
+  waits ? budget(context).begin_waiting() : budget(context).end_waiting();
 }
 
 Run Outbox::copy(const Run& run, EgressContext& context) {
   close_run();
-  return chunk_.copy(run, backlog_, context);
+  return chunk_.copy(run, backlog_, budget(context), context);
 }
 
 Entry Outbox::make_entry(const Run& run, const proto::FrameHeader& header, Handover handover,
@@ -62,7 +62,7 @@ void Outbox::push(const Run& run, const proto::FrameHeader& header, Handover han
   }
   Lanes& lanes = this->lanes();
   lanes.open.close();
-  const bool by_share = backlog_ && context.budget.scarce();
+  const bool by_share = backlog_ && budget(context).scarce();
   if (by_share && run.frames > 1 && run.size > kSharedChunkBytes) {
     context.tally.queued -= run.frames;
     return push_in_pieces(run, header, handover, context);
@@ -115,7 +115,7 @@ void Outbox::settle(EgressContext& context) {
   if (!lanes_) return;
   lanes_->open.close();
   if (begins) replace_latest(context);
-  context.budget.change(lanes_->charged_bytes, entry_bytes());
+  budget(context).change(lanes_->charged_bytes, entry_bytes());
   for (LaneQueue& lane : lanes_->queues) {
     lane.settle([&](Entry& entry) {
       settle_run(entry.run, entry.shared, context);
@@ -143,14 +143,20 @@ std::uint64_t Outbox::entry_bytes() const {
 }
 
 void Outbox::settle_run(Run& run, bool shared, EgressContext& context) {
-  const bool by_copy = (run.size < kSettleBytesMax && !shared) || context.budget.scarce();
-  if (by_copy && run.buffer->kind != BufferKind::chunk) run = copy(run, context);
-  context.pool.pin(*run.buffer.get());
+  BudgetLease& own = budget(context);
+  const bool small = run.size < kSettleBytesMax && !shared;
+  // While nothing waits, a frame is kept until it is confirmed, which is soon: whoever pays for its
+  // buffer, it stays there.
+  const bool by_copy = backlog_ ? must_copy(*run.buffer.get(), small, own)
+                                : (small || own.scarce()) && run.buffer->kind != BufferKind::chunk;
+  if (by_copy) run = copy(run, context);
+  context.pool.pin(*run.buffer.get(), own);
 }
 
 void Outbox::on_emptied(EgressContext& context) {
   if (lanes_) {
-    context.budget.give_back(std::exchange(lanes_->charged_bytes, 0));
+    if (lanes_->charged_bytes != 0)
+      budget(context).give_back(std::exchange(lanes_->charged_bytes, 0));
     lanes_->owed = {};
     lanes_->open.close();
   }
@@ -162,7 +168,8 @@ void Outbox::on_emptied(EgressContext& context) {
 
 void Outbox::signal_room(EgressContext& context) {
   if (!paused_anyone()) return;
-  if (context.budget.scarce() && data_bytes() > context.budget.share_bytes() / 2) return;
+  const BudgetLease& own = budget(context);
+  if (own.scarce() && data_bytes() > own.share_bytes() / 2) return;
   for (std::size_t lane = 0; lane < proto::kLaneCount; ++lane) {
     if (!lanes_->pauses.pauses(lane)) continue;
     const auto places = lanes_->queues[lane].places_with_room(context.limits.lane_bytes(lane));
@@ -247,7 +254,7 @@ bool Outbox::join_message(Entry& entry, const proto::FrameHeader& header, Egress
   }
   // The message may have been settled already, and is not looked at again.
   if (backlog_) settle_run(entry.run, entry.shared, context);
-  lane.append_fragment(*message, std::move(entry.run), entry.complete, context.pieces);
+  lane.append_fragment(*message, std::move(entry.run), entry.complete, memory(context).pieces);
   return true;
 }
 
@@ -263,7 +270,7 @@ void Outbox::push_in_pieces(const Run& run, const proto::FrameHeader& header, Ha
 
 void Outbox::release_written(std::uint64_t bytes, EgressContext& context) {
   const std::uint64_t wanted = held_bytes() + bytes;
-  const std::uint64_t share = context.budget.share_bytes();
+  const std::uint64_t share = budget(context).share_bytes();
   if (resume_ != nullptr && wanted > share) resume_->let_go(wanted - share, counted_);
 }
 
@@ -274,7 +281,7 @@ void Outbox::make_share(const Entry& entry, const proto::FrameHeader& header,
   if (!over_share(entry.size, context)) return;
   release_written(entry.size, context);
   if (entry.block || header.policy() == proto::Policy::drop) return;
-  const std::uint64_t share = context.budget.share_bytes();
+  const std::uint64_t share = budget(context).share_bytes();
   for (std::size_t lane = proto::kLaneCount; lane-- > (header.lane & proto::kLaneMask);) {
     while (held_bytes() + entry.size > share &&
            drop_for_room(lane, proto::DropReason::over_budget, context))
@@ -294,7 +301,7 @@ void Outbox::admit(Entry entry, const proto::FrameHeader& header, EgressContext&
   if (memory_refuses(entry, context))
     return lose_for_room(entry, lane_index, proto::DropReason::over_budget, context);
   // At once, or neighbours in the read buffer would become one run.
-  if (backlog_ && context.budget.scarce()) settle_run(entry.run, entry.shared, context);
+  if (backlog_ && budget(context).scarce()) settle_run(entry.run, entry.shared, context);
   if (finds_no_room(entry, lane_index, context)) {
     if (!entry.block && !entry.touched) return admit_to_full(std::move(entry), header, context);
     if (entry.block && !ask_to_pause(entry, header, context))
@@ -322,7 +329,7 @@ bool Outbox::ask_to_pause(const Entry& entry, const proto::FrameHeader& header,
   const std::size_t lane_index = header.lane & proto::kLaneMask;
   LaneQueue& lane = lanes_->queues[lane_index];
   const std::uint64_t lane_bytes = context.limits.lane_bytes(lane_index);
-  const bool scarce = backlog_ && context.budget.scarce();
+  const bool scarce = backlog_ && budget(context).scarce();
   if (!scarce && lane.is_within_share(NodeId{header.src}, entry.size, lane_bytes)) return true;
   const auto beyond = [](std::uint64_t bytes, std::uint64_t limit) {
     return std::max(bytes, limit) - limit;
@@ -330,7 +337,7 @@ bool Outbox::ask_to_pause(const Entry& entry, const proto::FrameHeader& header,
   PauseBook::Excess excess{beyond(lane.block_bytes() + entry.size, lane_bytes / 2),
                            context.limits.reserve_bytes};
   if (scarce) {
-    const std::uint64_t share = context.budget.share_bytes();
+    const std::uint64_t share = budget(context).share_bytes();
     excess.bytes = std::max(excess.bytes, beyond(held_bytes() + entry.size, share));
     excess.reserve = std::min(excess.reserve, share);
   }

@@ -95,6 +95,11 @@ class Outbox {
   /// able to ask.
   void push_first_control(std::span<const std::byte> frames, EgressContext& context);
 
+  /// It is a link's: what waits in it counts against the budget of links.
+  void set_link() { link_ = true; }
+  /// The budget against which what waits in it counts.
+  [[nodiscard]] BudgetLease& budget(EgressContext& context) const { return memory(context).budget; }
+
   /// Is told of messages of counted groups that are dropped here; nullptr: nobody is.
   void set_counted_groups(CountedGroups* counted) { counted_ = counted; }
   [[nodiscard]] const CountedGroups* counted_groups() const { return counted_; }
@@ -123,7 +128,8 @@ class Outbox {
   [[nodiscard]] std::uint64_t held_bytes() const;
   /// Memory is scarce, and with so many bytes more this connection would have more than its share.
   [[nodiscard]] bool over_share(std::uint64_t bytes, EgressContext& context) const {
-    return context.budget.scarce() && held_bytes() + bytes > context.budget.share_bytes();
+    const BudgetLease& own = budget(context);
+    return own.scarce() && held_bytes() + bytes > own.share_bytes();
   }
   /// Lets frames go that were written and not confirmed, oldest first, as far as it takes to have
   /// room for so many bytes in the share.
@@ -227,6 +233,9 @@ class Outbox {
   [[nodiscard]] std::uint64_t room(std::size_t lane, bool block, const Limits& limits) const {
     return lanes_->queues[lane].room(block, limits.lane_bytes(lane));
   }
+  [[nodiscard]] const WaitingMemory& memory(EgressContext& context) const {
+    return context.memory[link_ ? 1 : 0];
+  }
   [[nodiscard]] bool fits(const Entry& entry, std::size_t lane, const Limits& limits) const {
     return entry.size <= room(lane, entry.block, limits);
   }
@@ -240,7 +249,7 @@ class Outbox {
   void make_share(const Entry& entry, const proto::FrameHeader& header, EgressContext& context);
   /// Is memory for waiting data used up, whatever room the entry's lane has?
   [[nodiscard]] bool memory_refuses(const Entry& entry, EgressContext& context) const {
-    return context.budget.exhausted() ||
+    return budget(context).exhausted() ||
            (backlog_ && !entry.block && over_share(entry.size, context));
   }
   /// Has neither its lane nor, while memory is scarce, the connection's share room for it?
@@ -282,6 +291,7 @@ class Outbox {
   bool backlog_ = false;
   bool waits_ = false;  ///< counted among the connections that have data waiting
   bool has_untold_losses_ = false;
+  bool link_ = false;
 };
 
 }  // namespace gimnet::hub

@@ -128,7 +128,7 @@ void Pacer::offer_plain(PacedSubscription& subscription, const Run& run,
 /// never kept.
 void Pacer::hold_newest(PacedSubscription& subscription, Run rest, std::size_t lane,
                         Handover handover) {
-  if (context_.budget.exhausted()) return drop(subscription, rest, DropReason::over_budget);
+  if (budget(subscription).exhausted()) return drop(subscription, rest, DropReason::over_budget);
   const std::uint32_t depth = subscription.terms().depth;
   if (rest.frames > depth) {
     while (subscription.held() != 0) drop_oldest(subscription, DropReason::replaced);
@@ -137,7 +137,7 @@ void Pacer::hold_newest(PacedSubscription& subscription, Run rest, std::size_t l
   }
   while (rest.frames != 0) {
     const Run frame = rest.take_frame();
-    if (context_.budget.exhausted() || !make_share(subscription, frame.size)) {
+    if (budget(subscription).exhausted() || !make_share(subscription, frame.size)) {
       drop(subscription, frame, DropReason::over_budget);
     } else {
       keep(subscription, scratch_, frame, handover);
@@ -170,7 +170,7 @@ void Pacer::offer_fragment(PacedSubscription& subscription, const Run& run,
   open.next_offset = fragment.offset + size;
   open.came_ms = context_.now_ms;
   if (open.state == State::arriving &&
-      (context_.budget.exhausted() || !make_share(subscription, run.size))) {
+      (budget(subscription).exhausted() || !make_share(subscription, run.size))) {
     abandon(subscription, open, DropReason::over_budget);
     open.state = State::cut;
   }
@@ -231,7 +231,7 @@ bool Pacer::make_share(PacedSubscription& subscription, std::uint64_t bytes) {
 
 void Pacer::keep(PacedSubscription& subscription, KeptMessage& message, const Run& frame,
                  Handover handover) {
-  message.append(frame, handover.fan_out, context_);
+  message.append(frame, handover.fan_out, budget(subscription), context_);
   context_.tally.queued += 1;
   subscription.recipient().outbox.add_paced(frame.size, context_);
 }

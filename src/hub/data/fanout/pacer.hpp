@@ -100,6 +100,10 @@ class Pacer {
   using Open = PacedSubscription::Open;
 
   [[nodiscard]] std::uint64_t now_us() const { return context_.now_ms * 1000; }
+  /// The budget against which what is held for it counts.
+  [[nodiscard]] BudgetLease& budget(const PacedSubscription& subscription) {
+    return subscription.recipient().outbox.budget(context_);
+  }
   void offer_plain(PacedSubscription& subscription, const Run& run,
                    const proto::FrameHeader& header, Handover handover);
   /// Frames that may not begin. REQUIRES: there are some.

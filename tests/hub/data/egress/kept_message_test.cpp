@@ -21,7 +21,7 @@ TEST(KeptMessage, KeepsSmallFramesInMemoryOfItsOwn) {
   EgressRig rig;
   KeptMessage message;
   const hub::Run run = rig.run({"hello"});
-  message.append(run, false, rig.context);
+  message.append(run, false, rig.lease, rig.context);
   EXPECT_EQ(message.frames(), 1u);
   EXPECT_EQ(message.bytes(), run.size);
   message.for_each([&](const hub::Run& piece) { EXPECT_NE(piece.buffer.get(), run.buffer.get()); });
@@ -36,11 +36,11 @@ TEST(KeptMessage, RefersToWhatIsLargeOrSharedAnyway) {
   EgressRig rig;
   KeptMessage large;
   const hub::Run run = rig.run({std::string(16 * 1024, 'x')});
-  large.append(run, false, rig.context);
+  large.append(run, false, rig.lease, rig.context);
   large.for_each([&](const hub::Run& piece) { EXPECT_EQ(piece.bytes, run.bytes); });
   KeptMessage shared;
   const hub::Run small = rig.run({"small"});
-  shared.append(small, true, rig.context);
+  shared.append(small, true, rig.lease, rig.context);
   shared.for_each([&](const hub::Run& piece) { EXPECT_EQ(piece.bytes, small.bytes); });
   EXPECT_GT(rig.pool.pinned_bytes(), kSlabReadBytes);
 }
@@ -98,7 +98,7 @@ TEST(KeptMessage, PutsTheFramesOfAMessageBehindEachOther) {
   for (int i = 0; i < 10; ++i) {
     const hub::Run run = rig.run({std::string(3'000, static_cast<char>('a' + i))});
     wanted.append(reinterpret_cast<const char*>(run.bytes), run.size);
-    message.append(run, false, rig.context);
+    message.append(run, false, rig.lease, rig.context);
   }
   EXPECT_EQ(message.frames(), 10u);
   EXPECT_EQ(bytes_of(message), wanted);

@@ -214,11 +214,11 @@ TEST(Outbox, WhatReplacedAnOlderMessageIsSettledToo) {
   rig.push(connection.outbox, "key____1" + std::string(40'000, 'b'), {.flags = kLatest});
   connection.flush();
   const hub::Run& waiting = connection.outbox.lane(1).front().run;
-  EXPECT_TRUE(waiting.buffer->pinned);
+  EXPECT_EQ(waiting.buffer->payer, &rig.lease);
   rig.push(connection.outbox, "key____1" + std::string(3'000, 'c'), {.flags = kLatest});
   connection.flush();
   EXPECT_EQ(connection.outbox.lane(1).front().run.buffer->kind, BufferKind::chunk);
-  EXPECT_TRUE(connection.outbox.lane(1).front().run.buffer->pinned);
+  EXPECT_EQ(connection.outbox.lane(1).front().run.buffer->payer, &rig.lease);
 }
 
 TEST(Outbox, FragmentsOfOneMessageAreDroppedTogether) {

@@ -14,7 +14,7 @@ class PacedSubscriptionTest : public ::testing::Test {
  protected:
   KeptMessage message(const std::string& text) {
     KeptMessage kept;
-    kept.append(rig.run({text}), false, rig.context);
+    kept.append(rig.run({text}), false, rig.lease, rig.context);
     return kept;
   }
   testing::EgressRig rig;

@@ -164,7 +164,7 @@ TEST_F(ReceiveBufferTest, RewindsWhileNobodyKeepsAReference) {
   const auto frame = EgressRig::bytes(std::string(1'000, 'x'));
   read(reading, frame, 10'000);
   const std::byte* first = buffer.buffer()->data;
-  rig.pool.pin(*buffer.buffer().get());
+  rig.pool.pin(*buffer.buffer().get(), rig.lease);
   for (int i = 0; i < 7; ++i) read(reading, frame, 10'000);
   EXPECT_EQ(buffer.buffer()->data, first);
   FrameTail tail;

@@ -40,11 +40,15 @@ class EgressRig {
       : limits(given),
         budget(limits.budget_bytes),
         lease(budget),
+        link_budget(limits.link_budget_bytes),
+        link_lease(link_budget),
         pool(static_cast<std::uint32_t>(limits.frame_bytes), lease),
         pieces(lease),
+        link_pieces(link_lease),
         drops(tally, limits.report_interval_ms, limits.reports),
-        context{limits, pool,    pieces,    lease,         tally,
-                drops,  signals, 1'000'000, 1'000'000'000, HubId{7}} {}
+        context{limits,    pool,          {{{lease, pieces}, {link_lease, link_pieces}}},
+                tally,     drops,         signals,
+                1'000'000, 1'000'000'000, HubId{7}} {}
 
   static std::vector<std::byte> bytes(const std::string& payload, const TestFrame& frame = {}) {
     proto::FrameHeader header;
@@ -104,8 +108,11 @@ class EgressRig {
   Limits limits;
   Budget budget;
   BudgetLease lease;
+  Budget link_budget;
+  BudgetLease link_lease;
   BufferPool pool;
   PiecePool pieces;
+  PiecePool link_pieces;
   Tally tally;
   DropBook drops;
   FakeSignals signals;

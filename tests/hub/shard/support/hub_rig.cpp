@@ -8,7 +8,11 @@
 namespace gimnet::hub::testing {
 
 HubRig::HubRig(std::size_t shards, Limits limits)
-    : limits_(limits), quiescence_(shards), budget_(limits.budget_bytes, shards), inbox_(shards) {
+    : limits_(limits),
+      quiescence_(shards),
+      budget_(limits.budget_bytes, shards),
+      link_budget_(limits.link_budget_bytes, shards),
+      inbox_(shards) {
   std::vector<Mailbox*> mailboxes;
   std::vector<Waker*> wakers;
   std::vector<ShardCounters*> counters;
@@ -25,7 +29,8 @@ HubRig::HubRig(std::size_t shards, Limits limits)
     sessions.push_back(sessions_.back().get());
   }
   shared_.emplace(HubShared{hub(), limits_, nodes_, groups_, routes_, quiescence_, budget_,
-                            retained_budget_, inbox_, mailboxes, wakers, counters, sessions});
+                            link_budget_, retained_budget_, inbox_, mailboxes, wakers, counters,
+                            sessions});
   for (std::size_t i = 0; i < shards; ++i) {
     shards_.push_back(std::make_unique<IoShard>(ShardIndex{static_cast<std::uint8_t>(i)}, *shared_,
                                                 IoShard::Options{}));

@@ -140,6 +140,7 @@ class HubRig {
   RouteTable routes_;
   Quiescence quiescence_;
   Budget budget_;
+  Budget link_budget_;
   Budget retained_budget_{limits_.retained_budget_bytes};
   ControlInbox inbox_;
   std::vector<std::unique_ptr<Waker>> wakers_;
