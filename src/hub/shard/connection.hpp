@@ -160,6 +160,7 @@ struct Progress {
   std::uint64_t block_since_ms = 0;
   std::uint64_t rate_bytes = 0;  ///< taken when the rate was last measured
   std::uint64_t rate_since_ms = 0;
+  bool emptied = false;  ///< since then nothing waited at the hub for a moment
 };
 
 /// A session on its shard, and its connection while it has one. There are as many as nodes, most of

@@ -132,7 +132,10 @@ void Flusher::let_wait(Connection& connection) {
 void Flusher::on_emptied(Connection& connection) {
   connection.outbox.on_emptied(state_.egress);
   connection.outbox.signal_room(state_.egress);
-  if (std::exchange(connection.gauged, false)) state_.sessions.set_queued(connection.slot, 0);
+  if (std::exchange(connection.gauged, false)) {
+    state_.sessions.set_queued(connection.slot, 0);
+    if (connection.progress) connection.progress->emptied = true;
+  }
   if (connection.gate.has(ReadGate::draining) && state_.nothing_follows &&
       !connection.confirm_due() && connection.transport->pending_out() == 0) {
     closer_.close(connection, proto::GoodbyeCode::draining, "the hub is shutting down");
@@ -211,7 +214,7 @@ void Flusher::look_after(Connection& connection) {
   // On some transports the kernel counts its own bookkeeping as unsent, so the difference may
   // shrink: never take less than before.
   const std::uint64_t taken = std::max(taken_bytes(connection), progress.rate_bytes);
-  adapt_unsent_limit(connection, taken);
+  adapt_to_rate(connection, taken);
   // The hub's own words (PING, PONG, CONFIRM) may pass while data does not.
   const std::uint64_t data_taken = std::min(taken, progress.data_end);
   if (data_taken != progress.block_taken_bytes || !connection.outbox.has_block()) {
@@ -239,13 +242,16 @@ void Flusher::look_after(Connection& connection) {
   }
 }
 
-void Flusher::adapt_unsent_limit(Connection& connection, std::uint64_t taken) {
+void Flusher::adapt_to_rate(Connection& connection, std::uint64_t taken) {
   Progress& progress = *connection.progress;
   const std::uint64_t passed_ms = state_.now_ms - progress.rate_since_ms;
   if (passed_ms < kRateWindowMs) return;
   const std::uint64_t rate = (taken - progress.rate_bytes) * 1'000 / passed_ms;
   progress.rate_bytes = taken;
   progress.rate_since_ms = state_.now_ms;
+  const bool emptied = std::exchange(progress.emptied, false);
+  if (connection.is_link())
+    connection.outbox.on_link_took(rate * Outbox::kLinkLaneMs / 1'000, emptied);
   const std::uint64_t wanted = std::clamp(rate * state_.limits.unsent_ms / 1'000, kUnsentBytesMin,
                                           state_.limits.unsent_bytes);
   const auto limit = rate > kFastBytesPerS ? 0u : static_cast<std::uint32_t>(wanted);

@@ -43,7 +43,7 @@ class Flusher {
   /// It has taken everything.
   void end_watch(Connection& connection);
   void on_emptied(Connection& connection);
-  void adapt_unsent_limit(Connection& connection, std::uint64_t taken);
+  void adapt_to_rate(Connection& connection, std::uint64_t taken);
 
   /// Of connections that wait again and again, so many do not allocate for it.
   static constexpr std::size_t kSpareMax = 256;

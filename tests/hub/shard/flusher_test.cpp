@@ -352,5 +352,32 @@ TEST(Flusher, ABrokenTransportEndsTheConnectionOnly) {
   EXPECT_FALSE(detached->said_by_peer);
 }
 
+/// Bytes that wait in lane 1 of a peer that takes so many each 100 ms and is sent more.
+double waiting_for(HubRig& rig, FakeNode& from, FakeNode& peer, std::size_t takes) {
+  const auto to = peer.id.value() + (index_of(peer.id) == kHubIndex ? 1 : 0);  // a node behind it
+  peer.pipe.set_room(takes + 10'000);
+  for (int step = 0; step < 10; ++step) {
+    for (std::size_t sent = 0; sent < 3 * takes; sent += 10'000)
+      rig.send(from, to, std::string(10'000, 'x'), {.flags = 2});
+    rig.settle_without_reading();
+    peer.read(takes);
+    rig.pass_ms(100);
+  }
+  for (int i = 0; i < 300; ++i) rig.send(from, to, std::string(10'000, 'x'), {.flags = 2});
+  rig.settle_without_reading();
+  return static_cast<double>(rig.connection(peer)->outbox.lane(1).bytes());
+}
+
+TEST(Flusher, InALaneOfALinkWaitsWhatItTakesIn200Ms) {
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  FakeNode& slow = rig.link(0, HubId{20});
+  EXPECT_NEAR(waiting_for(rig, a, slow, 100'000), Outbox::kLinkLaneBytesMin, 15'000.0);
+  FakeNode& faster = rig.link(0, HubId{30});
+  EXPECT_NEAR(waiting_for(rig, a, faster, 400'000), 800'000, 200'000.0);
+  FakeNode& node = rig.join(0);
+  EXPECT_NEAR(waiting_for(rig, a, node, 100'000), Limits{}.lane1_bytes, 15'000.0);
+}
+
 }  // namespace
 }  // namespace gimnet::hub

@@ -67,8 +67,11 @@ void Outbox::push(const Run& run, const proto::FrameHeader& header, Handover han
     context.tally.queued -= run.frames;
     return push_in_pieces(run, header, handover, context);
   }
-  const bool has_room = lanes.queues[lane].surely_fits(run.size, context.limits.lane_bytes(lane)) ||
-                        run.size <= room(lane, proto::is_block(header), context.limits);
+  // While nothing waits, a link's lane is as a node's.
+  const bool as_of_a_node = !(backlog_ && link_);
+  const bool has_room =
+      (as_of_a_node && lanes.queues[lane].surely_fits(run.size, context.limits.lane_bytes(lane))) ||
+      run.size <= room(lane, proto::is_block(header), context.limits);
   Entry entry = make_entry(run, header, handover, has_room && !by_share, context);
   if (by_share) make_share(entry, header, context);
   if (entry.fragmented) {
@@ -175,6 +178,12 @@ void Outbox::signal_room(EgressContext& context) {
     const auto places = lanes_->queues[lane].places_with_room(context.limits.lane_bytes(lane));
     lanes_->pauses.on_room(static_cast<proto::Lane>(lane), places, context.signals);
   }
+}
+
+void Outbox::on_link_took(std::uint64_t bytes, bool emptied) {
+  const auto limit =
+      static_cast<std::uint32_t>(std::clamp(bytes, kLinkLaneBytesMin, kLinkLaneBytesMax));
+  if (!emptied || (link_lane_bytes_ != 0 && limit > link_lane_bytes_)) link_lane_bytes_ = limit;
 }
 
 void Outbox::time_out_block(EgressContext& context) {
@@ -349,7 +358,7 @@ bool Outbox::ask_to_pause(const Entry& entry, const proto::FrameHeader& header,
 void Outbox::make_room(const Entry& entry, std::size_t lane_index, EgressContext& context) {
   LaneQueue& lane = lanes_->queues[lane_index];
   // Behind much of BLOCK the oldest messages would always be dropped before their turn came.
-  const bool new_goes = lane.block_bytes() > context.limits.lane_bytes(lane_index) / 4;
+  const bool new_goes = lane.block_bytes() > lane_bytes(lane_index, false, context.limits) / 4;
   while (!fits(entry, lane_index, context.limits)) {
     const bool own = lane.sources().loser() == entry.source;
     if (own && (new_goes || lane.sources().droppable(entry.source) == entry.size)) return;

@@ -95,10 +95,20 @@ class Outbox {
   /// able to ask.
   void push_first_control(std::span<const std::byte> frames, EgressContext& context);
 
-  /// It is a link's: what waits in it counts against the budget of links.
+  /// It is a link's: what waits in it counts against the budget of links, and its lanes have the
+  /// limit of on_link_took().
   void set_link() { link_ = true; }
   /// The budget against which what waits in it counts.
   [[nodiscard]] BudgetLease& budget(EgressContext& context) const { return memory(context).budget; }
+  /// In each lane of a link as many bytes may wait as it takes in so long: more would only be older
+  /// when they arrive. At least two frames of each half of a lane, at most what 1 Gbit/s takes in
+  /// 67 ms.
+  static constexpr std::uint64_t kLinkLaneMs = 200;
+  static constexpr std::uint64_t kLinkLaneBytesMin = 256 * 1024;
+  static constexpr std::uint64_t kLinkLaneBytesMax = 8 << 20;
+  /// The link took so many bytes in the last kLinkLaneMs. `emptied`: nothing waited for a moment,
+  /// so it could have taken more. REQUIRES: set_link().
+  void on_link_took(std::uint64_t bytes, bool emptied);
 
   /// Is told of messages of counted groups that are dropped here; nullptr: nobody is.
   void set_counted_groups(CountedGroups* counted) { counted_ = counted; }
@@ -231,7 +241,13 @@ class Outbox {
                                  Handover handover, bool has_room, EgressContext& context);
   [[nodiscard]] Run copy(const Run& run, EgressContext& context);
   [[nodiscard]] std::uint64_t room(std::size_t lane, bool block, const Limits& limits) const {
-    return lanes_->queues[lane].room(block, limits.lane_bytes(lane));
+    return lanes_->queues[lane].room(block, lane_bytes(lane, block, limits));
+  }
+  /// The limit of the lane. For BLOCK that of a link is as that of a node: a limit that shrinks
+  /// below what waits would have its senders held, and one that is soon empty gives a link to
+  /// senders nearby alone (docs/adr/0017-pause-goes-to-the-sender.md).
+  [[nodiscard]] std::uint64_t lane_bytes(std::size_t lane, bool block, const Limits& limits) const {
+    return link_lane_bytes_ != 0 && !block ? link_lane_bytes_ : limits.lane_bytes(lane);
   }
   [[nodiscard]] const WaitingMemory& memory(EgressContext& context) const {
     return context.memory[link_ ? 1 : 0];
@@ -292,6 +308,7 @@ class Outbox {
   bool waits_ = false;  ///< counted among the connections that have data waiting
   bool has_untold_losses_ = false;
   bool link_ = false;
+  std::uint32_t link_lane_bytes_ = 0;  ///< 0: no link, or not measured: as for a node
 };
 
 }  // namespace gimnet::hub

@@ -3,7 +3,7 @@
 
 #include "tests/hub/data/support/egress_rig.hpp"
 
-// Outboxes of links: a budget of their own.
+// Outboxes of links: a budget of their own, and lanes by what the link takes.
 
 namespace gimnet::hub {
 namespace {
@@ -11,6 +11,7 @@ namespace {
 using proto::DropReason;
 using Frames = hub::Run;  // ::testing::Test has another Run
 using testing::EgressRig;
+using ::testing::IsEmpty;
 using testing::TestConnection;
 using testing::TestFrame;
 
@@ -42,6 +43,13 @@ class OutboxLink : public ::testing::Test {
   void TearDown() override { EXPECT_TRUE(rig.ledger_exact()); }
 
   static std::int64_t used(const Budget& budget) { return budget.total() - budget.left(); }
+  [[nodiscard]] std::uint64_t waiting() { return link.outbox.lane(1).bytes(); }
+  /// Have exactly so many bytes room in lane 1 of the link, with those that wait?
+  [[nodiscard]] bool has_room_for_just(std::uint64_t bytes) {
+    const std::uint64_t more = bytes - waiting();
+    return link.outbox.has_room(more, 1, rig.limits) &&
+           !link.outbox.has_room(more + 1, 1, rig.limits);
+  }
 
   EgressRig rig{small_budgets()};
   TestConnection node{rig};
@@ -137,6 +145,58 @@ TEST_F(OutboxLink, AFrameThatIsOnlyKeptUntilItIsConfirmedIsNotCopied) {
   EXPECT_EQ(rig.tally.copied_bytes, copied);
   rig.tally.queued -= 2;
   rig.tally.delivered += 2;
+}
+
+TEST_F(OutboxLink, ALaneHasTheLimitOfANodesUntilItsRateIsKnown) {
+  rig.push(link.outbox, sized(kKiB), kOldest);
+  EXPECT_TRUE(has_room_for_just(rig.limits.lane1_bytes));
+  link.outbox.on_link_took(100 * kKiB, true);
+  EXPECT_TRUE(has_room_for_just(rig.limits.lane1_bytes)) << "it could have taken more";
+}
+
+TEST_F(OutboxLink, ALaneHasRoomForWhatTheLinkTookWithinBounds) {
+  rig.push(link.outbox, sized(kKiB), kOldest);
+  for (const auto& [took, limit] : {std::pair{std::uint64_t{0}, Outbox::kLinkLaneBytesMin},
+                                    {Outbox::kLinkLaneBytesMin, Outbox::kLinkLaneBytesMin},
+                                    {Outbox::kLinkLaneBytesMin + 1, Outbox::kLinkLaneBytesMin + 1},
+                                    {Outbox::kLinkLaneBytesMax, Outbox::kLinkLaneBytesMax},
+                                    {Outbox::kLinkLaneBytesMax + 1, Outbox::kLinkLaneBytesMax},
+                                    {UINT64_MAX, Outbox::kLinkLaneBytesMax}}) {
+    link.outbox.on_link_took(took, false);
+    EXPECT_TRUE(has_room_for_just(limit)) << took;
+  }
+}
+
+TEST_F(OutboxLink, OnceItWasEmptyItTookAtLeastSoMuch) {
+  rig.push(link.outbox, sized(kKiB), kOldest);
+  link.outbox.on_link_took(500 * kKiB, false);
+  link.outbox.on_link_took(499 * kKiB, true);
+  EXPECT_TRUE(has_room_for_just(500 * kKiB));
+  link.outbox.on_link_took(501 * kKiB, true);
+  EXPECT_TRUE(has_room_for_just(501 * kKiB));
+}
+
+TEST_F(OutboxLink, ALowerLimitDropsTheOldestWhenAnotherMessageComes) {
+  // Neighbours have different headers, or they would go together.
+  for (std::uint32_t i = 0; i < 100; ++i)
+    rig.push(link.outbox, sized(10 * kKiB), {.kind = proto::Kind::group, .dst = i % 2});
+  link.outbox.on_link_took(0, false);
+  EXPECT_EQ(waiting(), 1'000 * kKiB) << "nothing is dropped by the change itself";
+  rig.push(link.outbox, sized(10 * kKiB), kOldest);
+  EXPECT_EQ(waiting(), 250 * kKiB);
+  EXPECT_EQ(rig.dropped(DropReason::queue_full), 76u);
+}
+
+TEST_F(OutboxLink, MessagesSentWithBlockHaveTheRoomThatANodeHas) {
+  for (int i = 0; i < 12; ++i) rig.push(link.outbox, sized(60 * kKiB), {.flags = kBlock});
+  link.outbox.on_link_took(0, false);
+  rig.push(link.outbox, sized(48 * kKiB), {.flags = kBlock});
+  EXPECT_THAT(rig.signals.take(), IsEmpty()) << "exactly half of the lane";
+  rig.push(link.outbox, sized(16), {.flags = kBlock});
+  EXPECT_EQ(rig.signals.take().size(), 1u);
+  // The others have half of what the link takes, however much of BLOCK waits.
+  EXPECT_TRUE(has_room_for_just(waiting() + Outbox::kLinkLaneBytesMin / 2));
+  EXPECT_FALSE(rig.tally.any_dropped);
 }
 
 }  // namespace
