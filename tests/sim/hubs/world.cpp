@@ -120,6 +120,7 @@ void World::step() {
     if (const auto redrawn = each->redrawn()) {
       machines_[machine].plan.hub = redrawn->value();
       machines_[machine].redrawn = true;
+      ++redraws_;
     }
     stop(machine);
     after_ms(random_.below(500), [this, machine] { start(machine); });
@@ -148,8 +149,9 @@ void World::check_bounds() {
     for (const auto& connection : machine.hub->shard().connections)
       if (connection != nullptr && connection->outbox.stale_bytes() > most_waiting())
         broken(Checker::bounded, "more waits for a connection than may");
-    // One for each unique id that a hub had, and for each link and its dialler's.
-    const std::size_t records_most = machines_.size() + static_cast<std::size_t>(plan_.faults);
+    // One for each unique id and each hub id that a hub had, and for each link and its dialler's.
+    const std::size_t records_most =
+        machines_.size() + redraws_ + static_cast<std::size_t>(plan_.faults);
     const std::size_t links_most = 2 * wires_.size() * (1 + static_cast<std::size_t>(plan_.faults));
     if (machine.hub->links().network().store().records().size() > records_most)
       broken(Checker::bounded, "a hub has more records than there were hubs");

@@ -128,6 +128,7 @@ class World {
   std::vector<SimNode> operators_;  ///< one at each hub
   std::vector<std::shared_ptr<Line>> lines_;
   std::uint64_t lines_begun_ = 0;
+  std::size_t redraws_ = 0;                ///< hubs that began anew under another id
   std::optional<milliseconds> copied_at_;  ///< when a hub was last taken for a copy
   bool faults_ = true;                     ///< they may come, and nodes speak by themselves
 };
