@@ -100,8 +100,18 @@ void Closer::detach(Connection& connection, bool said_goodbye) {
     std::erase(state_.waiting_for_room, &connection);
   }
   state_.counters.connections.subtract(1);
+  if (connection.is_link()) count_lost_reports(connection);
   connection.outbox.clear_control();
   if (!connection.waits_when_away) lose_all(connection);
+}
+
+/// Those that wait for a link are not sent over another one.
+void Closer::count_lost_reports(Connection& connection) {
+  RingQueue<Run>& runs = connection.outbox.control().runs();
+  for (; !runs.empty(); runs.pop_front()) {
+    for (Run rest = runs.front().share(); rest.frames != 0; rest.skip_frame())
+      if (rest.header().kind == proto::Kind::report) state_.counters.reports_lost.add(1);
+  }
 }
 
 void Closer::lose_all(Connection& connection) {

@@ -35,6 +35,7 @@ class Closer {
   [[nodiscard]] bool say_goodbye(Connection& connection, proto::GoodbyeCode code,
                                  const std::string& sentence);
   void detach(Connection& connection, bool said_goodbye);
+  void count_lost_reports(Connection& connection);
   /// Drops the bytes that were read and not routed yet.
   void give_up_rest(Connection& connection);
   void tell(const Connection& connection, bool said_by_peer, proto::GoodbyeCode code,

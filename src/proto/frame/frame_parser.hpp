@@ -96,11 +96,12 @@ struct NextRun {
 inline constexpr std::size_t kRunBytesMax = 64 * 1024;
 
 /// True where neighbouring frames with equal headers mean the same to a router, so that they may
-/// travel as one run: not for LIST (its ids differ), FLOW and control kinds, fragments, extensions
-/// and LATEST, which are looked at singly.
+/// travel as one run: not for LIST (its ids differ), FLOW, REPORT and control kinds, fragments,
+/// extensions and LATEST, which are looked at singly.
 [[nodiscard]] constexpr bool may_form_run(const FrameHeader& header) {
   constexpr std::uint32_t kRunKinds = 0xFFFFu & ~(1u << static_cast<unsigned>(Kind::list)) &
-                                      ~(1u << static_cast<unsigned>(Kind::flow));
+                                      ~(1u << static_cast<unsigned>(Kind::flow)) &
+                                      ~(1u << static_cast<unsigned>(Kind::report));
   const auto kind = static_cast<unsigned>(header.kind);
   return kind < kFirstControlKind && ((kRunKinds >> kind) & 1u) != 0 &&
          !header.has(kFlagFragment | kFlagExt) && header.policy() != Policy::latest;

@@ -75,5 +75,34 @@ TEST(LinkControl, CountsAReportForALinkThatBroke) {
   EXPECT_EQ(rig.sum(&ShardCounters::reports_lost), 1u);
 }
 
+TEST(LinkControl, CountsReportsThatWaitForALinkThatBreaks) {
+  HubRig rig;
+  FakeNode& near = rig.link(0, kNear);
+  FakeNode& far = rig.link(0, kFar);
+  far.pipe.set_room(0);
+  const std::uint32_t src = make_id<NodeId>(kNear, kHubIndex).value();
+  for (int i = 0; i < 3; ++i)
+    rig.send(near, make_id<NodeId>(kFar, 5).value(), "a report",
+             {.kind = Kind::report, .src = src});
+  rig.settle_without_reading();
+  EXPECT_EQ(rig.sum(&ShardCounters::reports_lost), 0u);
+  far.pipe.reset();
+  rig.settle_without_reading();
+  EXPECT_EQ(rig.sum(&ShardCounters::reports_lost), 3u);
+}
+
+// After a break a hub tells a sender of `link_lost` and `link_unsure` in one write.
+TEST(LinkControl, PassesOnReportsOfTheSameHeaderThatComeTogether) {
+  HubRig rig;
+  FakeNode& near = rig.link(0, kNear);
+  FakeNode& far = rig.link(0, kFar);
+  const std::uint32_t src = make_id<NodeId>(kNear, kHubIndex).value();
+  for (int i = 0; i < 3; ++i)
+    rig.send(near, make_id<NodeId>(kFar, 5).value(), "a report",
+             {.kind = Kind::report, .src = src});
+  rig.settle();
+  EXPECT_EQ(std::ranges::count(far.kinds, Kind::report), 3);
+}
+
 }  // namespace
 }  // namespace gimnet::hub
