@@ -344,10 +344,11 @@ bool Outbox::ask_to_pause(const Entry& entry, const proto::FrameHeader& header,
     return std::max(bytes, limit) - limit;
   };
   PauseBook::Excess excess{beyond(lane.block_bytes() + entry.size, lane_bytes / 2),
-                           context.limits.reserve_bytes};
+                           context.limits.reserve_bytes, held_bytes() + entry.size};
+  if (!budget(context).scarce()) excess.held_most = budget_bytes(context.limits) / kPartFromAfar;
   if (scarce) {
     const std::uint64_t share = budget(context).share_bytes();
-    excess.bytes = std::max(excess.bytes, beyond(held_bytes() + entry.size, share));
+    excess.bytes = std::max(excess.bytes, beyond(excess.held, share));
     excess.reserve = std::min(excess.reserve, share);
   }
   return lanes_->pauses.ask(header, entry.size, excess, context);

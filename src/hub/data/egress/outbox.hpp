@@ -100,6 +100,11 @@ class Outbox {
   void set_link() { link_ = true; }
   /// The budget against which what waits in it counts.
   [[nodiscard]] BudgetLease& budget(EgressContext& context) const { return memory(context).budget; }
+  [[nodiscard]] std::uint64_t budget_bytes(const Limits& limits) const {
+    return link_ ? limits.link_budget_bytes : limits.budget_bytes;
+  }
+  /// BLOCK of other hubs may fill this part of the budget for one node or link.
+  static constexpr std::uint64_t kPartFromAfar = 8;
   /// In each lane of a link as many bytes may wait as it takes in so long: more would only be older
   /// when they arrive. At least two frames of each half of a lane, at most what 1 Gbit/s takes in
   /// 67 ms.

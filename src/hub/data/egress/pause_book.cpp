@@ -5,13 +5,6 @@
 #include "hub/data/egress/source_bytes.hpp"
 
 namespace gimnet::hub {
-namespace {
-
-/// BLOCK of other hubs may fill this part of the budget for one node, unless memory is scarce.
-constexpr std::uint64_t kPartFromAfar = 8;
-
-}  // namespace
-
 bool PauseBook::ask(const proto::FrameHeader& header, std::uint32_t bytes, const Excess& excess,
                     EgressContext& context) {
   const NodeId sender{header.src};
@@ -33,8 +26,7 @@ bool PauseBook::ask(const proto::FrameHeader& header, std::uint32_t bytes, const
     return !comes_though_held || excess.bytes <= reserves;
   }
   // Three links of 1 Gbit/s with a round trip of 50 ms bring 19 MB until PAUSE works.
-  return excess.bytes <= reserves ||
-         (!context.budget.scarce() && excess.bytes <= limits.budget_bytes / kPartFromAfar);
+  return excess.bytes <= reserves || excess.held <= excess.held_most;
 }
 
 std::uint64_t PauseBook::on_full(NodeId sender, const proto::flow::Target& target,

@@ -16,10 +16,13 @@ class PauseBook {
   [[nodiscard]] bool empty() const { return notes_.empty(); }
   [[nodiscard]] std::size_t size() const { return notes_.size(); }
 
-  /// The bytes with BLOCK that are beyond a limit, and how many may be before senders are held.
+  /// The bytes with BLOCK that are beyond a limit, and how many may be before senders are held. All
+  /// that the outbox holds, and up to how much it takes of senders of other hubs, which cannot be.
   struct Excess {
     std::uint64_t bytes = 0;
     std::uint64_t reserve = 0;
+    std::uint64_t held = 0;
+    std::uint64_t held_most = 0;
   };
   /// A frame with BLOCK came although its lane is full: asks its sender to pause. Returns false if
   /// it came all the same, although it was held: the frame is not to be taken.

@@ -64,23 +64,20 @@ TEST(PauseBook, SaysAgainWhatIsAboutAnotherHub) {
 }
 
 // A long way holds much until PAUSE works, and a link is never held.
-TEST(PauseBook, TakesFromOtherHubsAnEighthOfTheBudgetUnlessMemoryIsScarce) {
+TEST(PauseBook, TakesFromOtherHubsAsMuchAsTheOutboxMayHoldAndTheReserves) {
   testing::EgressRig rig;
   PauseBook book;
   proto::FrameHeader header;
   header.src = 8u << 20 | 1;
   header.dst = 7u << 20 | 99;
   const std::uint64_t reserve = rig.limits.reserve_bytes;
-  const auto takes = [&](std::uint64_t bytes) {
-    return book.ask(header, 100, {bytes, reserve}, rig.context);
+  const auto takes = [&](std::uint64_t bytes, std::uint64_t held_most) {
+    return book.ask(header, 100, {bytes, reserve, bytes, held_most}, rig.context);
   };
-  EXPECT_TRUE(takes(rig.limits.budget_bytes / 8));
-  EXPECT_FALSE(takes(rig.limits.budget_bytes / 8 + 1));
-  rig.lease.take(rig.limits.budget_bytes / 4 * 3);
-  rig.lease.begin_turn(1'000);
-  EXPECT_TRUE(takes(8 * reserve));
-  EXPECT_FALSE(takes(8 * reserve + 1));
-  rig.lease.give_back(rig.limits.budget_bytes / 4 * 3);
+  EXPECT_TRUE(takes(20 * reserve, 20 * reserve));
+  EXPECT_FALSE(takes(20 * reserve + 1, 20 * reserve));
+  EXPECT_TRUE(takes(8 * reserve, 0)) << "memory is scarce";
+  EXPECT_FALSE(takes(8 * reserve + 1, 0));
   book.release_all(rig.signals);
 }
 
