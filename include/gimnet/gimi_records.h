@@ -233,7 +233,7 @@ typedef struct gimi_send_counts {
   uint64_t lost;                /**< Known not to have arrived, or nobody will ever tell. */
   uint64_t skipped;             /**< Not sent: GIMI_SKIP, or replaced under GIMI_HOLD_LATEST. */
   uint64_t waiting;             /**< Sent and not acknowledged yet, and one that is held. */
-  gimi_loss_reason loss_reason; /**< Of the last one that was lost. */
+  gimi_loss_reason loss_reason; /**< Of the last one; GIMI_LOSS_LINK_UNSURE stays. */
   char loss[GIMI_SENTENCE_BYTES_MAX + 1]; /**< The same in words. */
 } gimi_send_counts;
 

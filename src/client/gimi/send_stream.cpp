@@ -172,7 +172,8 @@ void SendStream::settle_freed(const AckWindow::Freed& freed, const Loss& why) {
   if (!freed.any()) return;
   counts_.acknowledged += freed.acknowledged;
   counts_.lost += freed.lost;
-  if (freed.lost != 0) {
+  // That one of them may have arrived is what a program has to know before it sends them again.
+  if (freed.lost != 0 && counts_.loss_reason != LossReason::link_unsure) {
     counts_.loss = why.words;
     counts_.loss_reason = why.reason;
   }
@@ -214,7 +215,8 @@ void SendStream::on_doubt(const Loss& why) {
 void SendStream::lose_all(const Loss& why) {
   AckWindow::Freed freed = window_.lose_all();
   if (std::exchange(held_, std::nullopt)) ++freed.lost;
-  settle_freed(freed, why);
+  const Loss& doubt = asked_ ? asked_ : doubt_;
+  settle_freed(freed, doubt.reason == LossReason::link_unsure ? doubt : why);
   forget_doubts();
 }
 

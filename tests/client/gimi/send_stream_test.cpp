@@ -169,6 +169,20 @@ TEST_F(SendStreamTest, AReportOfAGoneRouteFreesEverythingThere) {
   EXPECT_EQ(stream.counts().lost, 2u);
 }
 
+// The receiver died: a hub does not know whether it took the first, and then nobody has that id.
+TEST_F(SendStreamTest, AMessageThatMayHaveArrivedIsNotLostByTheNextReport) {
+  const Sender stream = sender(3);
+  stream.send("1").or_throw();
+  stream.send("2").or_throw();
+  const auto first = hub_.next_message();
+  ASSERT_TRUE(first);
+  report(proto::DropReason::link_unsure, 1, *first);
+  report(proto::DropReason::no_such_node, 1, *first);
+  EXPECT_TRUE(stream.settle().is(Status::not_delivered));
+  EXPECT_EQ(stream.counts().lost, 2u);
+  EXPECT_EQ(stream.counts().loss_reason, LossReason::link_unsure);
+}
+
 TEST_F(SendStreamTest, EndsAtALossWhereTheCallerWantsThat) {
   SendOptions options;
   options.key = kKey;
