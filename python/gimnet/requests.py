@@ -98,9 +98,9 @@ class Request(_Content, NotCopied):
         errors.check(status)
 
     def fail(self, code: int, sentence: str = "") -> None:
-        """Answers with an error of the program's own; a code has 32 bits. Closed."""
+        """Answers with an error of the program's own; a code is a signed number of 32 bits. Closed."""
         if ctypes.c_int32(code).value != code:
-            raise errors.BadArgument(f"the code of an error has 32 bits, and this is {code}")
+            raise errors.BadArgument(f"the code of an error is -2147483648 to 2147483647, and not {code}")
         words = to_text(sentence)
         interruptible(lambda: errors.check(_c.lib.gimi_fail_request(self._raw, code, words)))
 
