@@ -237,7 +237,7 @@ ExitCode ToolSession::fail(const Failure& failure) {
   const NodeState state = lost && node_ ? node_->state() : NodeState{};
   const bool known =
       !state.trouble.empty() && (state.ended || failure.status == Status::not_connected);
-  if (failure.status == Status::timeout && options_.hub_id != 0) {
+  if (node_ && failure.status == Status::timeout && options_.hub_id != 0) {
     say("hub " + std::to_string(options_.hub_id) + " did not answer within 4.9 s; see gimnet hubs");
   } else {
     say(known ? "lost the connection to the hub: " + state.trouble

@@ -5,6 +5,7 @@
 
 #include "base/clock.hpp"
 #include "tools/gimnet/json_writer.hpp"
+#include "tools/gimnet/network.hpp"
 #include "tools/gimnet/session.hpp"
 #include "tools/gimnet/table.hpp"
 
@@ -67,7 +68,7 @@ std::string shown_delay(double us) { return us == 0.0 ? "<turn" : shown(us); }
 ClockOffsets clocks_along(ToolSession& session, const std::vector<std::uint32_t>& hubs) {
   ClockOffsets clocks;
   for (std::size_t i = 0; i + 1 < hubs.size(); ++i) {
-    const auto links = session.node().hub_links(Timeout{5000}, i == 0 ? 0 : hubs[i]);
+    const auto links = session.node().hub_links(kHubPatience, i == 0 ? 0 : hubs[i]);
     if (!links) continue;
     for (const LinkRecord& link : *links) {
       if (link.hub_id != hubs[i + 1] || link.clock_error_ns == 0) continue;
