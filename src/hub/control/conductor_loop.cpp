@@ -100,6 +100,7 @@ struct ConductorLoop::Impl {
     see_off_leaving();
     tell_rest();  // a newcomer that finds no room has those served who said HELLO
     arm_timer();
+    if (stopping) return;  // a newcomer's HELLO had this hub begin anew: the door is gone
     if (after == Acceptor::After::wait) return watch_door(door);
     door.pause.expires_after(milliseconds{Acceptor::kPauseMs});
     door.pause.async_wait([this, &door](const error_code& error) {

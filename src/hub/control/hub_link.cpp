@@ -43,7 +43,7 @@ std::string HubLink::title() const {
   GIMNET_CHECK(peer_.has_value());
   const std::string& name = peer_->hub_name;
   return "hub " + std::to_string(peer_->hub.hub.value()) +
-         (name.empty() ? std::string{} : " '" + name + "'");
+         (name.empty() ? std::string{} : " '" + escaped(name) + "'");
 }
 
 void HubLink::begin_connection(const proto::HubIntroduction& said, const LinkTerms& own,

@@ -110,6 +110,11 @@ class HubLink {
   /// As people are told: 0 while it was not measured.
   [[nodiscard]] std::uint16_t known_cost() const { return cost_.value().value_or(0); }
   [[nodiscard]] const LinkClock& clock() const { return clock_; }
+  /// Hubs at both ends have found other ways so long after a change.
+  [[nodiscard]] std::chrono::milliseconds change_time() const {
+    return std::chrono::milliseconds{250} +
+           2 * std::chrono::ceil<std::chrono::milliseconds>(clock_.round_trip_least);
+  }
   /// LinkClock::ahead, if the shard has to be told of it: less than a millisecond changes nothing.
   [[nodiscard]] std::optional<std::chrono::nanoseconds> take_clock_change();
   /// As the shard knows it; nothing: it does not.

@@ -20,8 +20,11 @@ std::optional<Goodbye> LinkHandshake::refusal(const Stranger& stranger,
     return Goodbye{GoodbyeCode::not_allowed,
                    "over a Unix socket only the user that runs the hub, and root, may link"};
   }
-  if (!hello.introduction || hello.introduction->link_name.empty())
-    return Goodbye{GoodbyeCode::malformed, "a HELLO of a hub without its id and the link's name"};
+  if (!hello.introduction || !is_link_name(hello.introduction->link_name)) {
+    return Goodbye{GoodbyeCode::malformed,
+                   "a HELLO of a hub without its id and the link's name, which is 1 to 255 bytes "
+                   "without spaces and control characters"};
+  }
   if (hello.introduction->features_required != 0) {
     return Goodbye{GoodbyeCode::bad_version,
                    "that hub requires features that this one does not have; use programs of one "

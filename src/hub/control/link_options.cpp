@@ -10,7 +10,6 @@
 namespace gimnet::hub {
 namespace {
 
-/// Texts of links are printed side by side, and in lines of the log.
 bool is_printable(std::string_view text) {
   const auto* bytes = reinterpret_cast<const unsigned char*>(text.data());
   const bool blank =
@@ -19,6 +18,10 @@ bool is_printable(std::string_view text) {
 }
 
 }  // namespace
+
+bool is_link_name(std::string_view name) {
+  return !name.empty() && name.size() <= proto::kNameBytesMax && is_printable(name);
+}
 
 Result<DialledLink> make_link(std::string_view url, std::string_view name) {
   if (url.size() > proto::kNameBytesMax || !is_printable(url)) {
@@ -33,7 +36,7 @@ Result<DialledLink> make_link(std::string_view url, std::string_view name) {
     return Error{"cannot link to '" + std::string{url} +
                  "': the path would begin in the folder that the hub runs in; write unix:/path"};
   }
-  if (name.size() > proto::kNameBytesMax || !is_printable(name)) {
+  if (!name.empty() && !is_link_name(name)) {
     return Error{"a link cannot have the name '" + escaped(name, kQuotedMax) + "': give at most " +
                  std::to_string(proto::kNameBytesMax) +
                  " bytes, without spaces and control characters"};

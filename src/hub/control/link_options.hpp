@@ -43,6 +43,10 @@ struct LinksOptions {
 /// Dialled links of one hub.
 inline constexpr std::size_t kDialledLinksMax = 4'093;
 
+/// Names of links, which other hubs give too, are printed side by side and in lines of the log: 1
+/// to 255 bytes of UTF-8 without spaces and control characters.
+[[nodiscard]] bool is_link_name(std::string_view name);
+
 /// A link to that URL. An empty name is the URL. Errors: a sentence that names what is wrong, and
 /// says how to write it.
 [[nodiscard]] Result<DialledLink> make_link(std::string_view url, std::string_view name);

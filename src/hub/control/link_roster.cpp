@@ -46,14 +46,20 @@ HubLink* LinkRoster::find_accepted(const proto::UniqueId& dialler, std::string_v
   return nullptr;
 }
 
-Result<HubLink*> LinkRoster::to_change(std::string_view name, std::string_view how) const {
+Result<HubLink*> LinkRoster::to_change(std::string_view name) const {
   HubLink* const link = find(name);
   if (link == nullptr)
     return Error{"there is no link '" + std::string{name} + "'; see gimnet links"};
   if (link->is_dialled()) return link;
   const std::string there = link->peer() ? link->title() : "the other side";
-  return Error{there + " dials that link; change it there: gimnet ctl link " + std::string{how} +
-               " " + link->name()};
+  // The other side chose that name: it is shown, and is no word of a command to repeat.
+  std::string names;
+  for (const auto& [number, each] : links_) {
+    const bool meant =
+        each.get() == link || (!each->is_dialled() && each->peer() && name == shown_name(*each));
+    if (meant) names += (names.empty() ? "'" : " or '") + each->name() + "'";
+  }
+  return Error{there + " dials that link; change it there, as " + names};
 }
 
 HubLink& LinkRoster::add(DialledLink dialled) {

@@ -31,9 +31,8 @@ class LinkRoster {
   /// The one that the hub with that unique id dialled under that name.
   [[nodiscard]] HubLink* find_accepted(const proto::UniqueId& dialler, std::string_view name) const;
 
-  /// The dialled link of that name, or why none can be changed. `how`: the word of `gimnet ctl
-  /// link` with which the other side can.
-  [[nodiscard]] Result<HubLink*> to_change(std::string_view name, std::string_view how) const;
+  /// The dialled link of that name, or why none can be changed.
+  [[nodiscard]] Result<HubLink*> to_change(std::string_view name) const;
 
   HubLink& add(DialledLink dialled);
   /// One that the other side dialled.

@@ -299,7 +299,11 @@ milliseconds Links::announce_end(Moment moment) {
   network_.announce_end();
   advance(moment);
   const bool is_between = std::ranges::count(network_.map().ways(), 1, &Way::hops) > 1;
-  return is_between ? kRemovalQuiet : milliseconds{0};
+  if (!is_between) return milliseconds{0};
+  milliseconds longest{0};
+  for (const auto& [number, link] : links_.all())
+    if (link->connected()) longest = std::max(longest, link->change_time());
+  return std::min(longest, kRemovalMost);
 }
 
 void Links::send_all(std::span<const Sending> sendings) {
@@ -352,10 +356,9 @@ void Links::send(const HubLink& link, proto::Kind kind, std::span<const std::byt
 }
 
 std::string Links::add(const DialledLink& link) {
-  if (HubLink* known = links_.find(link.name); known != nullptr && known->is_dialled()) {
-    if (!known->removed) return "there is a link '" + link.name + "' already; give another name";
-    close(*known, GoodbyeCode::done, kRemoved);
-    give_up(*known);
+  if (const HubLink* known = links_.find(link.name); known != nullptr && known->is_dialled()) {
+    if (known->removed) return "link '" + link.name + "' is being removed; try again in 2 s";
+    return "there is a link '" + link.name + "' already; give another name";
   }
   if (links_.all().size() >= kLinksMax) return "this hub has as many links as there can be";
   links_.add(link).dial_after(milliseconds{0}, milliseconds{0});
@@ -363,7 +366,7 @@ std::string Links::add(const DialledLink& link) {
 }
 
 std::string Links::remove(std::string_view name) {
-  const Result<HubLink*> found = links_.to_change(name, "remove");
+  const Result<HubLink*> found = links_.to_change(name);
   if (!found) return found.error().sentence;
   HubLink* const link = *found;
   if (!link->connected()) {
@@ -372,9 +375,8 @@ std::string Links::remove(std::string_view name) {
     // Routes move to other links at both ends, and this one carries what is under way.
     link->fix_cost(LinkCost::kMost);
     network_.set_cost(link->number(), link->cost());
-    const auto round_trip = std::chrono::ceil<milliseconds>(link->clock().round_trip_least);
     CloseCommand command{ref_of(*link->place), GoodbyeCode::done, kRemoved};
-    command.quiet_ms = static_cast<std::uint32_t>((kRemovalQuiet + 2 * round_trip).count());
+    command.quiet_ms = static_cast<std::uint32_t>(link->change_time().count());
     command.most_ms = static_cast<std::uint32_t>(kRemovalMost.count());
     wiring_.shards.send(link->place->shard, std::move(command));
   }
@@ -382,7 +384,7 @@ std::string Links::remove(std::string_view name) {
 }
 
 std::string Links::set_cost(std::string_view name, std::uint16_t cost) {
-  const Result<HubLink*> found = links_.to_change(name, "cost");
+  const Result<HubLink*> found = links_.to_change(name);
   if (!found) return found.error().sentence;
   HubLink* const link = *found;
   if (link->removed) return "that link is removed";

@@ -34,9 +34,8 @@ namespace gimnet::hub {
 class Links {
  public:
   static constexpr std::size_t kLinksMax = 4'093;
-  /// Hubs have found other ways so long after a change. A link that is removed ends when nothing
-  /// was under way on it for that time and two round trips, or after the longer one.
-  static constexpr std::chrono::milliseconds kRemovalQuiet{250};
+  /// A link that is removed ends when nothing was under way on it for HubLink::change_time(), and
+  /// after this time in any case.
   static constexpr std::chrono::milliseconds kRemovalMost{2'000};
   /// A hub that began anew gives way to no other hub before: whoever may link could end it at will.
   static constexpr std::chrono::milliseconds kRedrawPause = std::chrono::minutes(1);

@@ -261,8 +261,10 @@ ExitCode link(ToolSession& session) {
       ctl.change == "add"      ? session.node().add_link(ctl.link, ctl.name, cost, ctl.proxy)
       : ctl.change == "remove" ? session.node().remove_link(ctl.link)
                                : session.node().set_link_cost(ctl.link, cost);
+  const std::string removing =
+      "removing " + ctl.link + ": it ends when it has carried what is under way";
   const std::string words = ctl.change == "add"      ? "dialling " + ctl.link
-                            : ctl.change == "remove" ? "removed " + ctl.link
+                            : ctl.change == "remove" ? removing
                             : cost == 0 ? "the cost of " + ctl.link + " is measured now"
                                         : ctl.link + " costs " + std::to_string(cost) + " now";
   return done(session, outcome, words);

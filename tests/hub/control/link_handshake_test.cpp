@@ -37,9 +37,11 @@ TEST(LinkHandshake, NeedsAnIntroduction) {
   proto::Hello bare = hello();
   bare.introduction.reset();
   EXPECT_EQ(rig.judge(bare)->code, GoodbyeCode::malformed);
-  proto::Hello nameless = hello();
-  nameless.introduction->link_name.clear();
-  EXPECT_EQ(rig.judge(nameless)->code, GoodbyeCode::malformed);
+  for (const char* name : {"", "two words", "x\ngimnet: forged", "\x1b[2J"}) {
+    proto::Hello named = hello();
+    named.introduction->link_name = name;
+    EXPECT_EQ(rig.judge(named)->code, GoodbyeCode::malformed) << name;
+  }
 }
 
 TEST(LinkHandshake, RefusesFeaturesThatItDoesNotHave) {

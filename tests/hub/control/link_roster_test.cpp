@@ -62,15 +62,17 @@ TEST(LinkRoster, SaysWhereALinkOfTheOtherSideIsChanged) {
   said.hub_name = "lab";
   link.begin_connection(said, {}, milliseconds{0});
   for (const char* name : {"up", "from hub 7"}) {
-    const auto found = table.to_change(name, "remove");
+    const auto found = table.to_change(name);
     ASSERT_FALSE(found);
-    EXPECT_EQ(found.error().sentence,
-              "hub 7 'lab' dials that link; change it there: gimnet ctl link remove up");
+    EXPECT_EQ(found.error().sentence, "hub 7 'lab' dials that link; change it there, as 'up'");
   }
-  EXPECT_EQ(table.to_change("from hub 8", "cost").error().sentence,
+  table.add_accepted("second").begin_connection(said, {}, milliseconds{0});
+  EXPECT_EQ(table.to_change("from hub 7").error().sentence,
+            "hub 7 'lab' dials that link; change it there, as 'up' or 'second'");
+  EXPECT_EQ(table.to_change("from hub 8").error().sentence,
             "there is no link 'from hub 8'; see gimnet links");
   HubLink& dialled = table.add(named("up"));
-  EXPECT_EQ(*table.to_change("up", "cost"), &dialled);
+  EXPECT_EQ(*table.to_change("up"), &dialled);
 }
 
 TEST(LinkRoster, TellsWhichEndedLongAgo) {

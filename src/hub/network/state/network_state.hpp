@@ -164,7 +164,10 @@ class NetworkState {
   }
   /// This hub will end: from now on it says that its links cost as much as they can, so that others
   /// find ways around it. Its own ways stay.
-  void announce_end() { ends_ = links_changed_ = true; }
+  void announce_end() {
+    ends_ = links_changed_ = true;
+    own_.hurry();
+  }
   /// Ends all links: after a verdict.
   void leave();
   /// Takes another hub id. REQUIRES: no link.

@@ -21,6 +21,9 @@ class ChangePace {
   };
   explicit ChangePace(Pauses pauses) : pauses_(pauses), pause_(pauses.first) {}
 
+  /// It may be done at once.
+  void hurry() { next_ = std::chrono::milliseconds::min() / 2; }
+
   /// From when on it may be done.
   [[nodiscard]] std::chrono::milliseconds next() const { return next_; }
   /// It is done. REQUIRES: now >= next().
@@ -81,6 +84,8 @@ class OwnRecord {
   /// was named again. One record alone may be of a process that has ended. Nothing: none is known.
   [[nodiscard]] std::optional<proto::HubInstance> living_copy() const { return living_copy_; }
   void forget_copy();
+  /// The next change is said at once, however many were said lately.
+  void hurry() { change_pace_.hurry(); }
 
   /// The parts that are to be sent now.
   [[nodiscard]] std::vector<PartRef> take_due(std::chrono::milliseconds now);

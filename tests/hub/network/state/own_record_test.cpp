@@ -82,6 +82,9 @@ TEST(OwnRecord, SaysAChangeAtOnceAndThenMoreAndMoreSlowly) {
   EXPECT_EQ(record.take_due(later).size(), 1u);
   record.set_neighbours({{hub_key(1), 2}});
   EXPECT_EQ(record.next_due(), later + milliseconds(50)) << "quiet time begins anew";
+  EXPECT_TRUE(record.take_due(later).empty());
+  record.hurry();
+  EXPECT_EQ(record.take_due(later).size(), 1u) << "the hub ends, and cannot wait";
 }
 
 TEST(OwnRecordGoesOn, BehindAFormerLife) {
