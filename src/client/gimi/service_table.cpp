@@ -159,6 +159,7 @@ nif_status ServiceTable::ask(const Subscribed& service, std::int32_t timeout_ms)
   const nif_status status =
       nif_subscribe_paced(uplink_.node(), service->name().c_str(), &wanted, &found, timeout_ms);
   if (status != NIF_OK) return status;
+  service->on_granted(share.rate_hz);
   service->retained = found.retain != 0;
   const ServicePlace place{found.group,
                            found.provider,

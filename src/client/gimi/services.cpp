@@ -210,6 +210,9 @@ SubscribedService::SharedSubscriber SubscribedService::add(const SubscribeOption
   auto subscriber = std::make_shared<Subscriber>(inbox_, wish, latest_);
   subscriber->missed_before = missed_;
   subscribers_.push_back(subscriber);
+  // The hub may begin before its answer is seen here.
+  const double asked_hz = widest_share().rate_hz;
+  hub_rate_hz_ = higher_bound(hub_rate_hz_.value_or(asked_hz), asked_hz);
   pace_queues();
   return subscriber;
 }
@@ -219,7 +222,6 @@ void SubscribedService::remove(const Subscriber& subscriber) {
   std::erase_if(subscribers_,
                 [&subscriber](const SharedSubscriber& each) { return each.get() == &subscriber; });
   if (subscribers_.empty()) last_ = counted_ = {};
-  pace_queues();
 }
 
 bool SubscribedService::is_read() {
@@ -233,9 +235,12 @@ Share SubscribedService::share() {
 }
 
 void SubscribedService::pace_queues() {
-  const double of_hub = widest_share().rate_hz;
-  for (const SharedSubscriber& each : subscribers_)
-    inbox_.pace(each->queue, each->wish.rate_hz == of_hub ? 0.0 : each->wish.rate_hz);
+  const double of_hub = hub_rate_hz_.value_or(0.0);
+  for (const SharedSubscriber& each : subscribers_) {
+    const double wanted = each->wish.rate_hz;
+    const bool kept_by_hub = higher_bound(of_hub, wanted) == wanted;
+    inbox_.pace(each->queue, kept_by_hub ? 0.0 : wanted);
+  }
 }
 
 Share SubscribedService::widest_share() const {
@@ -243,11 +248,9 @@ Share SubscribedService::widest_share() const {
   for (const SharedSubscriber& subscriber : subscribers_) {
     const Share one = subscriber->share();
     if (!widest) widest = one;
-    const bool unbound = one.window == 0 || widest->window == 0;
-    widest->window = unbound ? 0 : std::max(widest->window, one.window);
+    widest->window = higher_bound(widest->window, one.window);
     widest->depth = std::max(widest->depth, one.depth);
-    const bool unpaced = one.rate_hz == 0.0 || widest->rate_hz == 0.0;
-    widest->rate_hz = unpaced ? 0.0 : std::max(widest->rate_hz, one.rate_hz);
+    widest->rate_hz = higher_bound(widest->rate_hz, one.rate_hz);
   }
   return widest.value_or(Share{});
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -98,6 +99,12 @@ class PublishedService {
   Ending end_ GIMNET_GUARDED_BY(mutex_);
 };
 
+/// The higher one of two bounds, of which 0 is none.
+template <class T>
+[[nodiscard]] T higher_bound(T one, T other) {
+  return one == T{} || other == T{} ? T{} : std::max(one, other);
+}
+
 /// The terms on which the hub is asked for a service.
 struct Share {
   std::uint32_t window = 0;  ///< 0: as the service has it
@@ -146,6 +153,12 @@ class SubscribedService {
   [[nodiscard]] bool is_read() GIMNET_EXCLUDES(mutex_);
   /// As much as the subscriber wants that wants most.
   [[nodiscard]] Share share() GIMNET_EXCLUDES(mutex_);
+  /// The hub was asked for that rate and agreed: it sends no more from now on.
+  void on_granted(double rate_hz) GIMNET_EXCLUDES(mutex_) {
+    const MutexLock lock(mutex_);
+    hub_rate_hz_ = rate_hz;
+    pace_queues();
+  }
   /// Messages that did not come for it, by their sequence.
   [[nodiscard]] std::uint64_t missed(const Subscriber& subscriber) GIMNET_EXCLUDES(mutex_);
 
@@ -216,8 +229,7 @@ class SubscribedService {
   [[nodiscard]] Stream* find(const Position& message) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] const char* reason() const GIMNET_REQUIRES(mutex_);
   [[nodiscard]] Share widest_share() const GIMNET_REQUIRES(mutex_);
-  /// The hub sends as much as the subscriber wants that wants most: the queues of those that want a
-  /// lower rate keep it themselves.
+  /// The queues of those that want a lower rate than the hub may send keep it themselves.
   void pace_queues() GIMNET_REQUIRES(mutex_);
   /// One of its messages is about to be put into queues: whoever takes it knows what is missing
   /// before it.
@@ -231,6 +243,9 @@ class SubscribedService {
   Mutex mutex_;
   Condition changed_;
   std::vector<SharedSubscriber> subscribers_ GIMNET_GUARDED_BY(mutex_);
+  /// The hub may send at this rate: the highest that it was asked for since it last agreed to one.
+  /// 0: no bound. Nothing: it was not asked yet.
+  std::optional<double> hub_rate_hz_ GIMNET_GUARDED_BY(mutex_);
   bool latest_ GIMNET_GUARDED_BY(mutex_) = false;  ///< its delivery
   bool exists_ GIMNET_GUARDED_BY(mutex_) = false;
   bool accepts_ GIMNET_GUARDED_BY(mutex_) = false;

@@ -68,6 +68,14 @@ class LeftSubscriptions : public testing::Test {
                                 proto::encode_answer(ns::UnsubscribeAnswer{}, number));
     leaving.join();
   }
+  /// A message comes to all subscribers of a service.
+  static void put(const ServiceTable::Subscribed& service) {
+    Message message = test::make_message("x");
+    EXPECT_EQ(service->put({}, message), SubscribedService::Put::kept);
+  }
+  [[nodiscard]] std::uint64_t received(const ServiceTable::Reading& reading) {
+    return inbox_.counts(reading.subscriber->queue).received;
+  }
   /// It is read with a window of 2.
   void follow() {
     std::thread asking([this] {
@@ -137,6 +145,37 @@ TEST_F(LeftSubscriptions, NoMoreThanTheOthersWant) {
   leave_with_an_answer(std::move(all), 7);
   leave_with_an_answer(std::move(wide), 2);
   leave(std::move(narrow));
+}
+
+TEST_F(LeftSubscriptions, TheOthersRatesUntilTheHubKeepsThem) {
+  const ServiceTable::Reading rare =
+      subscribe(kName, {.rate_hz = 0.001, .queue = 9, .timeout = kForever}, 0);
+  ServiceTable::Reading all = subscribe(kName, {.timeout = kForever}, 0);
+  put(rare.service);
+  EXPECT_EQ(received(rare), 1u) << "the first comes at once";
+  std::thread leaving([&] { table_.unsubscribe(std::exchange(all, {})); });
+  std::uint16_t number = 0;
+  ASSERT_TRUE(connected_.hub.next_request<ns::Subscribe>(number));
+  put(rare.service);
+  put(rare.service);
+  EXPECT_EQ(received(rare), 1u) << "the hub has not answered";
+  connected_.hub.send_control(
+      proto::Kind::ns,
+      proto::encode_refusal({ns::Subscribe::kOperation, number}, {proto::Status::limit, "no"}));
+  leaving.join();
+  put(rare.service);
+  put(rare.service);
+  EXPECT_EQ(received(rare), 1u) << "the hub sends all as before";
+  leave(rare);
+}
+
+TEST_F(LeftSubscriptions, ARateThatTheHubKeepsIsNotKeptTwice) {
+  const ServiceTable::Reading rare =
+      subscribe(kName, {.rate_hz = 0.001, .queue = 9, .timeout = kForever}, 0);
+  leave_with_an_answer(subscribe(kName, {.timeout = kForever}, 0), 0);
+  for (int i = 0; i < 3; ++i) put(rare.service);
+  EXPECT_EQ(received(rare), 3u);
+  leave(rare);
 }
 
 TEST_F(LeftSubscriptions, OnesThatWantTheNewestOnlyHaveAWindowOfTwo) {
