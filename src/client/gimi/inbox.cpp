@@ -9,6 +9,9 @@
 namespace gimnet::gimi {
 namespace {
 
+/// Later than any due time, and far from an overflow.
+constexpr std::int64_t kAnyTimeNs = INT64_MAX / 2;
+
 Failure none(Timeout timeout) {
   return {Status::timeout,
           "nothing was received within " + std::to_string(timeout.count()) + " ms"};
@@ -255,7 +258,8 @@ void Inbox::visit_any(const SourceVisitor& visitor) {
 
 Inbox::News Inbox::news_of(MessageQueue& queue) {
   if (queue.is_paced()) {
-    give_due(queue, steady_now_ns());  // it had no room
+    // It had no room. After the end nobody looks again when it is due.
+    give_due(queue, end_ ? kAnyTimeNs : steady_now_ns());
     set_due();
   }
   recount(queue);
@@ -376,7 +380,7 @@ Inbox::Counts Inbox::counts(MessageQueue& queue) {
 void Inbox::end(const Ending& ending) {
   const MutexLock lock(mutex_);
   end_ = ending;
-  for (MessageQueue* queue : paced_) give_due(*queue, INT64_MAX / 2);
+  for (MessageQueue* queue : paced_) give_due(*queue, kAnyTimeNs);
   any_.notify_all();
   any_source_.update(true);
   for (MessageQueue& queue : queues_) {

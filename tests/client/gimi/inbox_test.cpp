@@ -83,6 +83,22 @@ TEST(PacedQueue, GetsTheNewestAtEachDueTime) {
   EXPECT_EQ(inbox.receive(paced, kNoWait)->sequence(), 4u) << "what came is given out";
 }
 
+TEST(PacedQueue, GivesOutWhatFoundNoRoomBeforeTheEnd) {
+  Inbox inbox(2, 1000, [] {});
+  MessageQueue& paced = inbox.add_queue({1, AtFullQueue::stop_reading});
+  inbox.pace(paced, 0.001);
+  for (std::uint32_t sequence = 1; sequence <= 2; ++sequence) {
+    Message message = make_message("x", sequence);
+    EXPECT_TRUE(inbox.put(paced, message, nullptr));
+  }
+  inbox.end(Ending::closed());
+  EXPECT_EQ(inbox.receive(paced, kNoWait)->sequence(), 1u);
+  const auto held = inbox.receive(paced, kNoWait);
+  ASSERT_TRUE(held) << "it is not due for a long time, but nothing else comes";
+  EXPECT_EQ(held->sequence(), 2u);
+  EXPECT_TRUE(inbox.receive(paced, kNoWait).is(Status::closed));
+}
+
 TEST(PacedQueue, EndsWithAMessage) {
   Inbox inbox(2, 1000, [] {});
   MessageQueue& paced = inbox.add_queue({});
