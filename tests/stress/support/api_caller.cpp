@@ -104,7 +104,7 @@ gimi_status ApiCaller::judge(std::int32_t limit_ms, gimi_status status) {
     return status;
   }
   if (status == GIMI_OK) {
-    ++succeeded_[name_];
+    note_success();
     return status;
   }
   EXPECT_NE(*gimi_error_text(), '\0') << name_;
@@ -121,7 +121,11 @@ void ApiCaller::judge_number(std::uint64_t answer) {
   if (is_child_) {
     EXPECT_EQ(answer, 0u) << name_ << " in a child";
   }
-  if (answer != 0) ++succeeded_[name_];
+  if (answer != 0) note_success();
+}
+
+void ApiCaller::note_success() {
+  if (noted_.insert(name_).second) shared.successes.succeeded(name_);
 }
 
 void ApiCaller::judge_time(std::int32_t limit_ms) {
@@ -144,6 +148,7 @@ void ApiCaller::keep(gimi_status status, const gimi_handle& made) {
 }
 
 void ApiCaller::close(gimi_handle handle) {
+  shared.requests.closed(handle);
   begin();
   const gimi_status status = gimi_close(handle);
   judge_time(0);

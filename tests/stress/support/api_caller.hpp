@@ -2,8 +2,8 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <map>
 #include <random>
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -32,7 +32,6 @@ class ApiCaller {
   /// The longest time that a call took beyond its limit, and which.
   [[nodiscard]] std::string worst() const;
   [[nodiscard]] std::uint64_t calls() const { return calls_; }
-  [[nodiscard]] const std::map<std::string, std::uint64_t>& succeeded() const { return succeeded_; }
 
   // ---- for the calls
 
@@ -85,6 +84,7 @@ class ApiCaller {
   gimi_status judge(std::int32_t limit_ms, gimi_status status);
   void judge_number(std::uint64_t answer);
   void judge_time(std::int32_t limit_ms);
+  void note_success();
 
   std::vector<gimi_message> messages_;
   std::vector<gimi_request> requests_;
@@ -93,7 +93,7 @@ class ApiCaller {
   gimi_handle picked_ = 0;  ///< last
   Clock::time_point begun_;
   std::uint64_t calls_ = 0;
-  std::map<std::string, std::uint64_t> succeeded_;  ///< by the call's name
+  std::set<std::string> noted_;  ///< successes that were told to the others
   std::int64_t worst_ms_ = INT64_MIN;
   std::string worst_;
   bool is_child_ = false;

@@ -86,8 +86,19 @@ std::uint64_t RequestBook::ended_later(gimi_handle pending, gimi_status status, 
   const std::uint64_t number = pending_.at(pending);
   note(number, status, ran);
   // Another thread may have been given its end, or closed it.
-  if (status != GIMI_CLOSED) ++entries_.at(number).ends;
+  Entry& entry = entries_.at(number);
+  if (status == GIMI_CLOSED) {
+    entry.closed = true;
+  } else {
+    ++entry.ends;
+  }
   return number;
+}
+
+void RequestBook::closed(gimi_handle handle) {
+  const std::lock_guard lock(mutex_);
+  const auto found = pending_.find(handle);
+  if (found != pending_.end()) entries_.at(found->second).closed = true;
 }
 
 void RequestBook::note(std::uint64_t number, gimi_status status, gimi_ran ran) {
@@ -103,6 +114,7 @@ std::string RequestBook::check() {
   for (std::size_t number = 0; number < entries_.size(); ++number) {
     const Entry& entry = entries_[number];
     EXPECT_LE(entry.ends, 1u) << "request " << number << " ended twice";
+    EXPECT_TRUE(entry.ends != 0 || entry.closed) << "request " << number << " did not end";
     EXPECT_FALSE(entry.said_no && entry.taken != 0)
         << "request " << number << " was done, and said that it was not: " << entry.words;
     EXPECT_FALSE(entry.said_yes && entry.taken == 0)

@@ -6,6 +6,7 @@
 #include <map>
 #include <mutex>
 #include <random>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -80,8 +81,16 @@ class RequestBook {
   /// The same of a pending one, of which the ends beside GIMI_CLOSED are counted: there is one at
   /// most. Returns its number.
   std::uint64_t ended_later(gimi_handle pending, gimi_status status, gimi_ran ran);
-  /// Compares what was told with what was done. Returns how many there were of each end, in words.
+  /// A handle is about to be closed: if a request belongs to it, that need not tell its end.
+  void closed(gimi_handle handle);
+  /// Compares what was told with what was done: each request ended once, but for those of which the
+  /// handle or the node was closed. Returns how many there were of each end, in words.
   [[nodiscard]] std::string check();
+  /// A reply came.
+  [[nodiscard]] bool has_done() {
+    const std::lock_guard lock(mutex_);
+    return counts_.contains({GIMI_OK, GIMI_RAN_YES});
+  }
   void lock() { mutex_.lock(); }
   void unlock() { mutex_.unlock(); }
 
@@ -90,6 +99,7 @@ class RequestBook {
     bool repeat = false;
     std::uint32_t taken = 0;
     std::uint32_t ends = 0;
+    bool closed = false;   ///< its handle, or its node
     bool said_no = false;  ///< that nobody did it
     std::string words;     ///< with that
     bool said_yes = false;
@@ -102,9 +112,27 @@ class RequestBook {
   std::map<std::pair<gimi_status, gimi_ran>, std::uint64_t> counts_;
 };
 
+/// Names of the calls that succeeded. Thread safety: any thread.
+class SuccessBook {
+ public:
+  void succeeded(const char* call) {
+    const std::lock_guard lock(mutex_);
+    calls_.insert(call);
+  }
+  [[nodiscard]] std::set<std::string> calls() {
+    const std::lock_guard lock(mutex_);
+    return calls_;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::set<std::string> calls_;
+};
+
 struct Playground {
   HandlePool handles;
   RequestBook requests;
+  SuccessBook successes;
   std::vector<std::string> hubs;  ///< URLs, some of them by way of proxies
 };
 
