@@ -74,7 +74,7 @@ void World::change_a_wire(std::uint64_t kind) {
     census_.note(Event::link_removed);
     wire.wanted = false;
     person.command(ctrl::LinkRemove{link.name});
-  } else {
+  } else if (find_link(index, 0) == nullptr) {  // otherwise it is being removed, and keeps its name
     census_.note(Event::link_added);
     wire.wanted = true;
     person.command(ctrl::LinkAdd{link.address.url(), link.name, wire.plan.cost});
