@@ -367,7 +367,7 @@ for begin in range(0, {1_000_000 if full else 16_000}, 50):
             for number in range(20):
                 gimnet.connect(hub=self.hub.url).close()
             # The thread of a connect() may end behind it, that of the first one after it was counted.
-            wait_until(lambda: all(now <= then for now, then in zip(count(), before)), "the end of all")
+            wait_until(lambda: all(after <= then for after, then in zip(count(), before)), "the end of all")
 
 
 if __name__ == "__main__":
