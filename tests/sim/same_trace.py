@@ -56,8 +56,9 @@ def hashes(program, folder, seeds):
 
 
 def newest_source():
-    folders = ("src/base", "src/proto", "src/hub", "tests/sim")
-    return max(path.stat().st_mtime for folder in folders for path in (ROOT / folder).rglob("*.?pp"))
+    """Of the program's own sources: the folders in tests/sim hold those of other programs."""
+    sources = [path for folder in ("src/base", "src/proto", "src/hub") for path in (ROOT / folder).rglob("*.?pp")]
+    return max(path.stat().st_mtime for path in [*sources, *(ROOT / "tests/sim").glob("*.?pp")])
 
 
 def main():
