@@ -59,11 +59,11 @@ typedef struct gimi_reply {
  * which there is exactly one. In brackets: reply->ran. GIMI_OK [yes]. GIMI_FAILED: the other
  * program says so [yes]. GIMI_NOT_FOUND: nobody answers there [no]. GIMI_BUSY: 64 requests, or
  * receive_bytes of them, wait there [no]. GIMI_NOT_DELIVERED: dropped on the way [no; maybe if a
- * link between hubs broke]. GIMI_DENIED: a link between hubs may not carry it [no]. GIMI_GONE: the
- * program ended, or let the request go [maybe]. GIMI_TIMEOUT [no if it was not sent or came too
+ * connection on the way broke]. GIMI_DENIED: a link between hubs may not carry it [no]. GIMI_GONE:
+ * the program ended, or let the request go [maybe]. GIMI_TIMEOUT [no if it was not sent or came too
  * late, else maybe]. GIMI_TOO_LARGE: the request [no], the reply [maybe]. GIMI_LIMIT: 1,024
- * requests of this node are open [no]. GIMI_NOT_CONNECTED, GIMI_CLOSED and others [no if it was
- * not sent, else maybe]. `data` may be NULL: nothing. */
+ * requests of this node are open [no]. GIMI_NOT_CONNECTED, GIMI_CLOSED and others [no if it was not
+ * sent, else maybe]. `data` may be NULL: nothing. */
 GIMNET_API gimi_status gimi_ask(gimi_handle node, const char* service, const gimi_bytes* data,
                                 const gimi_request_options* options, gimi_reply* reply);
 /** Asks and does not wait for the end, only for the hub to say where the service is. A request that
