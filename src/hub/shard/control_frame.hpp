@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <span>
 #include <vector>
@@ -18,9 +19,9 @@ namespace gimnet::hub {
   header.src = make_id<NodeId>(hub, kHubIndex).value();
   header.kind = kind;
   header.lane = static_cast<std::uint8_t>(proto::Lane::real_time);
-  std::vector<std::byte> frame(proto::kHeaderSize);
+  std::vector<std::byte> frame(proto::kHeaderSize + payload.size());
   proto::store_header(frame.data(), header);
-  frame.insert(frame.end(), payload.begin(), payload.end());
+  std::ranges::copy(payload, frame.begin() + proto::kHeaderSize);
   return frame;
 }
 
