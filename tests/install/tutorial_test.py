@@ -15,35 +15,16 @@ import unittest
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tests" / "system"))
 
+from support.documents import ENDINGS, TUTORIAL, Page  # noqa: E402
 from support.processes import Hub, Process, run_gimnet  # noqa: E402
 from support.waiting import wait_until  # noqa: E402
 
-TUTORIAL = ROOT / "docs" / "tutorial"
 PROGRAMS = ["publish", "newest", "answer", "ask", "robot", "drive", "camera", "view"]
-ENDINGS = {"cpp": ".cpp", "c": ".c", "python": ".py"}
 NEXT = {"cpp": "python", "c": "cpp", "python": "c"}
 TIMEOUT_S = 300
 LINES_MAX = 18
 PYTHON = re.compile(r"^```python\n(.*?)^```$", re.M | re.S)
 NUMBER = re.compile(r"\d+(\.\d+)?")
-
-
-class Page:
-    """The page of a language: its programs, what they print, and the line that builds one of them."""
-
-    def __init__(self, language):
-        text = (TUTORIAL / f"{language}.md").read_text(encoding="utf-8")
-        self.programs, self.shown = {}, {}
-        name = None
-        for kind, block in re.findall(r"^```(\w+)\n(.*?)^```$", text, re.M | re.S):
-            named = re.match(r"(?://|/\*|#) (\w+)\.\w+", block)
-            if kind == language and named:
-                name = named[1]
-                self.programs[name] = block
-            elif kind == "text":
-                self.shown[name] = block
-        line = re.search(r"^    ((?:c\+\+|cc) .*)$", text, re.M)
-        self.build_line = line[1] if line else ""
 
 
 def shape(text):

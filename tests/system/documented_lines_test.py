@@ -14,6 +14,7 @@ import subprocess
 import tempfile
 import unittest
 
+from support.documents import programs_of_the_readme
 from support.processes import BIN, ROOT, Hub, Process, run_gimnet, start_gimnet
 from support.waiting import wait_until
 
@@ -60,16 +61,6 @@ def lines_of(page, text):
 
 def all_lines():
     return [line for page, text in pages().items() for line in lines_of(page, text)]
-
-
-def programs_of_the_readme():
-    """Name and text of each whole program: the words before it name its file."""
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
-    found = {}
-    for name, code in re.findall(r"`(\w+\.cpp)`[^`]*?\n\n((?:    .*\n)+)", text):
-        if "int main(" in code:
-            found[name] = re.sub(r"^    ", "", code, flags=re.M)
-    return found
 
 
 class Documented(unittest.TestCase):
