@@ -97,9 +97,10 @@ class Hub:
     """A tcphub of its own, on a free port and a Unix socket in a folder of its own. Ends with the test, at whose end it has
     to have an exact ledger, if it lives then."""
 
-    def __init__(self, test, *arguments, shards=1, hub_id=7, listen=None, state=None, netns=None, env=None):
+    def __init__(self, test, *arguments, shards=1, hub_id=7, listen=None, state=None, netns=None, env=None,
+                 program=TCPHUB):
         """`hub_id`: None for the default. `listen`: URLs, or what gives them for the URL of its Unix socket. `netns`: a network namespace to run in."""
-        self._how = {"shards": shards, "hub_id": hub_id, "netns": netns, "env": env}
+        self._how = {"shards": shards, "hub_id": hub_id, "netns": netns, "env": env, "program": program}
         self._arguments = arguments
         self._folder = tempfile.TemporaryDirectory(prefix="gimnet-test-")
         test.addCleanup(self._folder.cleanup)
@@ -109,7 +110,7 @@ class Hub:
         if callable(listen):
             listen = listen(f"unix:{self.socket_path}")
         words = ["ip", "netns", "exec", netns] if netns else []
-        words += [TCPHUB, "--shards", str(shards), "--placement", "hint", "--state-dir", self.state]
+        words += [program, "--shards", str(shards), "--placement", "hint", "--state-dir", self.state]
         if hub_id:
             words += ["--hub-id", str(hub_id)]
         for address in listen:

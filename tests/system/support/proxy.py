@@ -51,7 +51,11 @@ class Proxy:
             end.recv(4096)
         elif end is self._listener:
             near = end.accept()[0]
-            far = socket.create_connection(self._to)
+            try:
+                far = socket.create_connection(self._to)
+            except OSError:  # nobody listens there at the moment
+                near.close()
+                return
             with self._lock:
                 self._other[near], self._other[far] = far, near
         else:
