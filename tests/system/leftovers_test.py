@@ -52,7 +52,7 @@ class Leftovers(unittest.TestCase):
         lines = lines_that_remove()
         self.assertEqual(len(lines), 3, "the page was not understood")
         variables = {"HOME": f"{self.home}/home", "TMPDIR": f"{self.home}/tmp"}
-        of_a_session = {"XDG_RUNTIME_DIR": f"{self.home}/run", "XDG_STATE_HOME": f"{self.home}/home/state"}
+        of_a_session = {"XDG_RUNTIME_DIR": f"{self.home}/run", "XDG_STATE_HOME": str(self.home / "home" / "state")}
         neither = {"XDG_RUNTIME_DIR": "", "XDG_STATE_HOME": ""}
         for name, others in (("of a session", of_a_session), ("neither", neither)):
             with self.subTest(name):
