@@ -13,6 +13,7 @@
 
 #include "base/mutex.hpp"
 #include "client/gimi/inbox.hpp"
+#include "client/gimi/published_service.hpp"
 #include "client/gimi/send_stream.hpp"
 #include "client/gimi/services.hpp"
 #include "client/gimi/turns.hpp"
