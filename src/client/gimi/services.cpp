@@ -25,7 +25,7 @@ QueueOptions Subscriber::queue_options(bool latest) const {
 SubscribedService::SharedSubscriber SubscribedService::add(const SubscribeOptions& wish) {
   const MutexLock lock(mutex_);
   auto subscriber = std::make_shared<Subscriber>(inbox_, wish, latest_);
-  subscriber->missed_before = missed_;
+  if (!subscribers_.empty()) subscriber->numbers.begin(subscribers_.front()->numbers.highest());
   subscribers_.push_back(subscriber);
   // The hub may begin before its answer is seen here.
   const double asked_hz = widest_share().rate_hz;
@@ -74,7 +74,7 @@ Share SubscribedService::widest_share() const {
 
 std::uint64_t SubscribedService::missed(const Subscriber& subscriber) {
   const MutexLock lock(mutex_);
-  return missed_ - subscriber.missed_before;
+  return subscriber.numbers.count();
 }
 
 std::uint64_t SubscribedService::missed_in_all() {
@@ -82,7 +82,7 @@ std::uint64_t SubscribedService::missed_in_all() {
   std::uint64_t sum = 0;
   for (const SharedSubscriber& each : subscribers_) {
     sum += inbox_.counts(each->queue).overwritten;
-    if (each->wish.rate_hz == 0.0) sum += missed_ - each->missed_before;
+    if (each->wish.rate_hz == 0.0) sum += each->numbers.count();
   }
   return sum;
 }
@@ -171,15 +171,22 @@ SubscribedService::Put SubscribedService::put(const std::optional<Position>& pos
 void SubscribedService::count_missed(const Position& message) {
   if (message == counted_) return;  // it found no room the last time
   counted_ = message;
-  const auto step = static_cast<std::int32_t>(message.sequence - last_.sequence);
-  // The first of a provider, or of an epoch, says where it stands.
-  if (message.from == last_.from && message.epoch == last_.epoch && step > 0)
-    missed_ += static_cast<std::uint32_t>(step - 1);
-  if (step > 1) inbox_.note_missed();
+  bool changed = false;
+  for (const SharedSubscriber& each : subscribers_) {
+    if (goes_on(message)) {
+      changed |= each->numbers.take(message.sequence);
+    } else {
+      each->numbers.begin(message.sequence);
+    }
+  }
+  if (changed) inbox_.note_missed();
 }
 
 void SubscribedService::take(const Position& message) {
-  last_ = message;
+  // The hub gives the newest one again, also behind one that came late.
+  const bool late =
+      goes_on(message) && static_cast<std::int32_t>(message.sequence - last_.sequence) < 0;
+  if (!late) last_ = message;
   Stream* stream = find(message);
   if (stream == nullptr) {
     if (streams_.size() == kProvidersMax) streams_.erase(streams_.begin());

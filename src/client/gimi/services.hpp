@@ -13,6 +13,7 @@
 #include "client/gimi/inbox.hpp"
 #include "client/gimi/message.hpp"
 #include "client/gimi/message_queue.hpp"
+#include "client/gimi/missed_numbers.hpp"
 #include "client/gimi/received_streams.hpp"
 #include "client/gimi/send_stream.hpp"
 #include "gimnet/gimi/options.hpp"
@@ -49,9 +50,8 @@ struct Subscriber {
 
   const SubscribeOptions wish;
   MessageQueue& queue;
-  /// Missed by the service when it began; guarded by the service's mutex, as the next one.
-  std::uint64_t missed_before = 0;
-  bool begun = false;  ///< a message came for it
+  MissedNumbers numbers;  ///< guarded by the service's mutex, as the next one
+  bool begun = false;     ///< a message came for it
 };
 
 /// A service of another node that this one subscribed, to read it or to know where it is. Thread
@@ -80,7 +80,7 @@ class SubscribedService {
     hub_rate_hz_ = rate_hz;
     pace_queues();
   }
-  /// Messages that did not come for it, by their sequence.
+  /// Messages that did not come for it, by their sequence. One that comes late is taken off again.
   [[nodiscard]] std::uint64_t missed(const Subscriber& subscriber) GIMNET_EXCLUDES(mutex_);
 
   /// All that its subscribers missed, as its hub is told: without those that did not come to a
@@ -155,6 +155,10 @@ class SubscribedService {
   /// One of its messages is about to be put into queues: whoever takes it knows what is missing
   /// before it.
   void count_missed(const Position& message) GIMNET_REQUIRES(mutex_);
+  /// It is of the stream of which messages came last.
+  [[nodiscard]] bool goes_on(const Position& message) const GIMNET_REQUIRES(mutex_) {
+    return message.from == last_.from && message.epoch == last_.epoch;
+  }
   /// One of its messages is in a queue.
   void take(const Position& message) GIMNET_REQUIRES(mutex_);
 
@@ -172,10 +176,10 @@ class SubscribedService {
   bool accepts_ GIMNET_GUARDED_BY(mutex_) = false;
   bool answers_ GIMNET_GUARDED_BY(mutex_) = false;
   std::optional<Failure> refusal_ GIMNET_GUARDED_BY(mutex_);
-  Position last_ GIMNET_GUARDED_BY(mutex_);                ///< from nobody: nothing came yet
+  /// The one with the highest number of the stream that came last; from nobody: nothing came yet.
+  Position last_ GIMNET_GUARDED_BY(mutex_);
   Position counted_ GIMNET_GUARDED_BY(mutex_);             ///< by count_missed(), last
   std::vector<Stream> streams_ GIMNET_GUARDED_BY(mutex_);  ///< the one that began last is the last
-  std::uint64_t missed_ GIMNET_GUARDED_BY(mutex_) = 0;
   Ending end_ GIMNET_GUARDED_BY(mutex_);
 };
 
