@@ -252,8 +252,9 @@ class Node(Waitable):
                   timeout: float = 5.0) -> Source:
         """Subscribes to a service, which need not exist yet; each call has a queue of its own. `rate_hz`: the
         newest at each due time. `newest_only`: only the newest waits. `queue`: messages that may wait; the
-        oldest is overwritten. `silence`: receive() raises Silence once in that time while nothing comes.
-        `window`, `depth`: for experts. BadName, NotFound (it takes commands)."""
+        oldest is overwritten. Default: 64, and more while they take at most 16 MiB. `silence`: receive() raises
+        Silence once in that time while nothing comes. `window`, `depth`: for experts. BadName, NotFound (it takes
+        commands)."""
         for option, value in (("rate_hz", rate_hz), ("queue", queue), ("silence", silence)):
             if value is not None and value == 0:  # the C functions take 0 for a wish that nobody has
                 raise errors.BadArgument(f"{option} is 0: use more than 0, or leave it out")

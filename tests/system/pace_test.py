@@ -16,7 +16,7 @@ from rate_proxy import RateProxy
 from support.delivery import STREAM_DELIVERY, SYNC_DELIVERY, Provider, advertise, subscribe
 from support.processes import Hub, run_gimnet, start_gimnet
 from support.waiting import wait_until
-from support.wire import CREDIT, FLOW, GROUP, NS, Client, number, text
+from support.wire import CREDIT, FLOW, GROUP, MISSED, NS, Client, number, text
 
 FULL = os.environ.get("GIMNET_STRESS") == "full"
 
@@ -44,6 +44,25 @@ class Latest(unittest.TestCase):
                 echo.signal(2)
                 self.assertEqual(echo.wait(), 130, echo.err)
 
+    def test_who_publishes_is_told_at_the_end_what_subscribers_missed(self):
+        for delivery, said in (("stream", True), ("latest", False)):
+            with self.subTest(delivery=delivery):
+                hub = Hub(self)
+                pub = start_gimnet(self, hub, "pub", "robot/odom", "--delivery", delivery, "--wait", "1",
+                                   stdin=subprocess.PIPE)
+                hub.wait_for_node("robot")
+                viewer = Client(self, hub).join()
+                group = viewer.ask(NS, 10, text(3, "robot/odom"))[4]
+                missed = bytes([MISSED, 0, 0, 0]) + struct.pack("<IQ", group, 54)
+                viewer.send(viewer.frame(0, missed, kind=FLOW))
+
+                def told(hub=hub):
+                    services = json.loads(run_gimnet(hub, "services", "robot/odom", "--json").out)
+                    return services and services[0]["missed"] == 54
+                wait_until(told, "the hub's count")
+                pub.feed(b"one\n")
+                self.assertEqual(pub.wait(), 0, pub.err)
+                self.assertEqual("subscribers missed 54 or more" in pub.err, said, pub.err)
 
     def test_the_hub_shows_who_misses_how_many(self):
         hub = Hub(self)

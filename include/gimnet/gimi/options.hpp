@@ -102,9 +102,10 @@ struct SubscribeOptions {
                          ///< 0: no bound
   /// Only the newest message waits, in the queue and at the hub; `queue` is 0 or 1.
   bool newest_only = false;
-  /// Messages that may wait, 1..kQueueMessagesMax. 0: kQueueMessagesDefault; and with newest_only,
-  /// with rate_hz and of a service with Delivery::latest 1, which a newer message overwrites,
-  /// whatever `at_full` says.
+  /// Messages that may wait, 1..kQueueMessagesMax. 0: kQueueMessagesDefault, and with
+  /// AtFullQueue::overwrite_oldest more as long as they take 16 MiB at most (docs/gimi.md,
+  /// "Services"). With newest_only, with rate_hz and of a service with Delivery::latest 0 is 1
+  /// message, which a newer one overwrites, whatever `at_full` says.
   std::size_t queue = 0;
   AtFullQueue at_full = AtFullQueue::overwrite_oldest;
   Timeout timeout{5000};  ///< for the hub's answer

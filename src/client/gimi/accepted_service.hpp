@@ -24,7 +24,7 @@ class AcceptedService {
  public:
   AcceptedService(Inbox& inbox, std::string name, const std::string& own_name,
                   const QueueOptions& options)
-      : queue(inbox.add_queue(options)), name_(std::move(name)) {
+      : queue(inbox.add_queue({options})), name_(std::move(name)) {
     on_renamed(own_name);
   }
   ~AcceptedService() { queue.inbox().remove(queue); }

@@ -8,16 +8,13 @@
 #include "base/clock.hpp"
 
 namespace gimnet::gimi {
-namespace {
 
-void log(const std::string& node, const std::string& words) {
+void log_info(const std::string& node, const std::string& words) {
   const char* const level = std::getenv("GIMNET_LOG");
   if (level == nullptr || std::string_view(level) != "info") return;
   const std::string line = "gimnet: " + node + ": " + words + "\n";
   static_cast<void>(std::fwrite(line.data(), 1, line.size(), stderr));
 }
-
-}  // namespace
 
 Outcome<ConnectionEvent> ConnectionQueue::receive(Timeout timeout) {
   const std::int64_t deadline = deadline_after(timeout);
@@ -74,7 +71,7 @@ void ConnectionEvents::remove(const Queue& queue) {
 }
 
 void ConnectionEvents::tell(ConnectionChange change, const std::string& node, std::string why) {
-  log(node, why);
+  log_info(node, why);
   const MutexLock lock(mutex_);
   last_ = {change, 0, wall_now_ns(), std::move(why)};
   for (const Queue& queue : queues_) queue->put(last_);

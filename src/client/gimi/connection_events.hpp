@@ -14,6 +14,10 @@
 
 namespace gimnet::gimi {
 
+/// Writes a line about a node to standard error if GIMNET_LOG=info asks for that. `node`: its name,
+/// for people. Thread safety: any thread.
+void log_info(const std::string& node, const std::string& words);
+
 /// The events of a connection that one reader has not taken. Thread safety: any
 /// thread. Limit: kEventsMax; the oldest goes, and the next one counts it as skipped.
 class ConnectionQueue {

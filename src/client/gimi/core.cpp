@@ -258,10 +258,7 @@ void Core::on_gap(const nif_incoming& in) {
 }
 
 void Core::tell(ConnectionChange change, std::string why) {
-  nif_info info{};
-  info.struct_size = sizeof info;
-  static_cast<void>(nif_get_info(node(), &info));
-  connection_.tell(change, *info.name != '\0' ? info.name : Peer{info.id}.text(), std::move(why));
+  connection_.tell(change, uplink_.node_name(), std::move(why));
 }
 
 void Core::on_connected(const nif_incoming& in) {

@@ -28,11 +28,12 @@ MessageQueue& Inbox::queue(MessageKey key, const QueueOptions* options) {
     if (place != by_key_.end()) {
       found = place->second;
       std::erase(unasked_, found);
-      if (options != nullptr) found->set(*options);
+      if (options != nullptr) found->set({*options});
       news = news_of(*found);
     } else {
       const QueueOptions unasked{unasked_messages_, AtFullQueue::overwrite_oldest};
-      found = &queues_.emplace_back(*this, options != nullptr ? *options : unasked, bytes_max_);
+      found = &queues_.emplace_back(*this, QueueTerms{options != nullptr ? *options : unasked},
+                                    bytes_max_);
       by_key_.emplace(key, found);
     }
   }
@@ -40,10 +41,11 @@ MessageQueue& Inbox::queue(MessageKey key, const QueueOptions* options) {
   return *found;
 }
 
-MessageQueue& Inbox::add_queue(const QueueOptions& options, Timeout silence) {
+MessageQueue& Inbox::add_queue(const QueueTerms& terms, Timeout silence) {
   const MutexLock lock(mutex_);
-  MessageQueue& queue = queues_.emplace_back(*this, options, bytes_max_);
+  MessageQueue& queue = queues_.emplace_back(*this, terms, bytes_max_);
   queue.expect(silence);
+  growing_.look_at(queue);
   return queue;
 }
 
@@ -59,6 +61,7 @@ void Inbox::remove(MessageQueue& queue) {
   {
     const MutexLock lock(mutex_);
     std::erase(paced_, &queue);
+    growing_.leave(queue);
     queue.drop_held();
     static_cast<void>(queue.pop_newest());
     news = {refusing_ == &queue, false, queue.take_taken()};
@@ -153,7 +156,7 @@ bool Inbox::put(MessageKey key, Message& message, Receipt* receipt) {
   }
   if (unasked_.size() == kUnaskedKeysMax) forget_unasked();
   MessageQueue& queue = queues_.emplace_back(
-      *this, QueueOptions{unasked_messages_, AtFullQueue::overwrite_oldest}, bytes_max_);
+      *this, QueueTerms{{unasked_messages_, AtFullQueue::overwrite_oldest}}, bytes_max_);
   by_key_.emplace(key, &queue);
   unasked_.push_back(&queue);
   static_cast<void>(push(queue, message, receipt));  // it refuses nothing
@@ -352,11 +355,12 @@ std::optional<Message> Inbox::take(MessageQueue& queue, bool newest) {
   return message;
 }
 
-void Inbox::set(MessageQueue& queue, const QueueOptions& options) {
+void Inbox::set(MessageQueue& queue, const QueueTerms& terms) {
   News news;
   {
     const MutexLock lock(mutex_);
-    queue.set(options);
+    queue.set(terms);
+    growing_.look_at(queue);
     news = news_of(queue);
   }
   tell(news);
@@ -367,6 +371,7 @@ void Inbox::resize(MessageQueue& queue, std::size_t messages) {
   {
     const MutexLock lock(mutex_);
     queue.resize(messages);
+    growing_.look_at(queue);
     news = news_of(queue);
   }
   tell(news);

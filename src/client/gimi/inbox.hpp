@@ -12,6 +12,7 @@
 
 #include "base/mutex.hpp"
 #include "client/gimi/ending.hpp"
+#include "client/gimi/growing_queues.hpp"
 #include "client/gimi/message_queue.hpp"
 #include "gimnet/gimi/outcome.hpp"
 
@@ -61,7 +62,7 @@ class Inbox {
   /// The queue of a key, made if there is none; with `options` changed to them.
   MessageQueue& queue(MessageKey key, const QueueOptions* options) GIMNET_EXCLUDES(mutex_);
   /// A queue for a subscription, until remove(). `silence`: as in SubscribeOptions.
-  MessageQueue& add_queue(const QueueOptions& options, Timeout silence = Timeout{0})
+  MessageQueue& add_queue(const QueueTerms& terms, Timeout silence = Timeout{0})
       GIMNET_EXCLUDES(mutex_);
   /// At most so many messages a second come into a queue that add_queue() made, the newest at each
   /// due time; 0: all that come.
@@ -115,7 +116,7 @@ class Inbox {
   [[nodiscard]] std::optional<Message> take_newest(MessageQueue& queue) GIMNET_EXCLUDES(mutex_) {
     return take(queue, true);
   }
-  void set(MessageQueue& queue, const QueueOptions& options) GIMNET_EXCLUDES(mutex_);
+  void set(MessageQueue& queue, const QueueTerms& terms) GIMNET_EXCLUDES(mutex_);
   void resize(MessageQueue& queue, std::size_t messages) GIMNET_EXCLUDES(mutex_);
 
   struct Counts {
@@ -180,6 +181,7 @@ class Inbox {
   /// Those of keys for which nobody asked. Limit: kUnaskedKeysMax
   std::vector<MessageQueue*> unasked_ GIMNET_GUARDED_BY(mutex_);
   std::vector<MessageQueue*> paced_ GIMNET_GUARDED_BY(mutex_);  ///< Limit: all that are there
+  GrowingQueues growing_ GIMNET_GUARDED_BY(mutex_);
   std::size_t any_waiters_ GIMNET_GUARDED_BY(mutex_) = 0;
   MessageQueue* refusing_ GIMNET_GUARDED_BY(mutex_) =
       nullptr;  ///< at most one: nothing comes while one refuses

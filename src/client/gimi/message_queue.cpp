@@ -10,11 +10,25 @@
 
 namespace gimnet::gimi {
 
-void MessageQueue::set(const QueueOptions& options) {
-  options_ = options;
-  options_.messages =
-      options.messages == 0 ? kQueueMessagesDefault : std::min(options.messages, kQueueMessagesMax);
-  make_room(options_.messages);
+void MessageQueue::set(const QueueTerms& terms) {
+  options_ = terms.options;
+  options_.messages = options_.messages == 0 ? kQueueMessagesDefault
+                                             : std::min(options_.messages, kQueueMessagesMax);
+  grows_ = terms.grows;
+  make_room(options_.messages, 0);
+}
+
+void MessageQueue::allow(std::size_t cost_bytes_max) {
+  cost_bytes_max_ = cost_bytes_max;
+  make_room(options_.messages, 0);
+}
+
+std::size_t MessageQueue::cost_of(const Message& message, const Message* neighbour) {
+  const std::size_t own = message.size() + kPlaceBytes;
+  const auto* const storage = static_cast<const nif::Storage*>(message.c_message().storage);
+  if (storage == nullptr) return own;
+  if (neighbour != nullptr && neighbour->c_message().storage == storage) return own;
+  return own + storage->shared_bytes();
 }
 
 bool MessageQueue::is_full() const {
@@ -60,8 +74,10 @@ bool MessageQueue::tells_silence() {
 
 void MessageQueue::push(Message message, std::uint64_t arrival) {
   GIMNET_ASSERT(!refuses());
-  make_room(options_.messages - 1);
+  const std::size_t cost = cost_of(message, entries_.empty() ? nullptr : &entries_.back().message);
+  make_room(options_.messages - 1, cost);
   bytes_ += message.size();
+  cost_bytes_ += cost;
   ++received_;
   if (silent_at_ns_ != INT64_MAX) expect(silence_);
   entries_.push_back({std::move(message), arrival});
@@ -69,10 +85,10 @@ void MessageQueue::push(Message message, std::uint64_t arrival) {
 
 std::optional<Message> MessageQueue::pop() {
   if (entries_.empty()) return std::nullopt;
+  count_taken(entries_.front().message);
+  leave_first();
   std::optional<Message> message(std::move(entries_.front().message));
-  bytes_ -= message->size();
   entries_.pop_front();
-  count_taken(*message);
   return message;
 }
 
@@ -81,7 +97,7 @@ std::optional<Message> MessageQueue::pop_newest() {
   for (const Entry& entry : entries_) count_taken(entry.message);
   std::optional<Message> message(std::move(entries_.back().message));
   entries_.clear();
-  bytes_ = 0;
+  bytes_ = cost_bytes_ = 0;
   return message;
 }
 
@@ -95,14 +111,22 @@ void MessageQueue::count_taken(const Message& message) {
   ++taken_.back().count;
 }
 
-void MessageQueue::make_room(std::size_t messages) {
-  while (entries_.size() > messages) overwrite_oldest();
+void MessageQueue::make_room(std::size_t messages, std::size_t more_bytes) {
+  while (entries_.size() > messages && !(grows_ && cost_bytes_ + more_bytes <= cost_bytes_max_))
+    overwrite_oldest();
+}
+
+/// The next one in the same slab goes on to keep that.
+void MessageQueue::leave_first() {
+  const Message& first = entries_.front().message;
+  bytes_ -= first.size();
+  cost_bytes_ -= cost_of(first, entries_.size() > 1 ? &entries_[1].message : nullptr);
 }
 
 std::size_t MessageQueue::overwrite_oldest() {
   const std::size_t bytes = entries_.front().message.size();
-  bytes_ -= bytes;
   count_taken(entries_.front().message);
+  leave_first();
   entries_.pop_front();
   ++overwritten_;
   inbox_.note_missed();

@@ -23,17 +23,33 @@ struct TakenMessages {
   std::uint32_t count = 0;
 };
 
+/// The room of a queue.
+struct QueueTerms {
+  QueueOptions options;
+  /// More messages than `options` says may wait, as long as all together take at most the bytes
+  /// that MessageQueue::allow() says. REQUIRES: the queue overwrites its oldest message.
+  bool grows = false;
+};
+
 /// Received messages of one key or subscription: a ring buffer, or one that refuses when it is
 /// full. Thread safety: guarded by the mutex of its Inbox, through which programs come to it.
 class MessageQueue {
  public:
-  MessageQueue(Inbox& inbox, const QueueOptions& options, std::size_t bytes_max)
+  MessageQueue(Inbox& inbox, const QueueTerms& terms, std::size_t bytes_max)
       : inbox_(inbox), bytes_max_(bytes_max) {
-    set(options);
+    set(terms);
   }
 
-  void set(const QueueOptions& options);
-  void resize(std::size_t messages) { set({messages, options_.at_full}); }
+  void set(const QueueTerms& terms);
+  void resize(std::size_t messages) { set({{messages, options_.at_full}}); }
+
+  /// It may hold more messages than its options say.
+  [[nodiscard]] bool grows() const { return grows_; }
+  /// One that grows may take so many bytes, as cost_bytes() counts them.
+  void allow(std::size_t cost_bytes_max);
+  /// Memory that its messages keep: a place and their bytes each, and the slabs that they lie in.
+  /// Those that lie in one slab behind each other share it.
+  [[nodiscard]] std::size_t cost_bytes() const { return cost_bytes_; }
 
   /// It would refuse. A message fits into an empty queue, whatever its size. A paced one holds the
   /// newest outside and refuses nothing.
@@ -87,8 +103,16 @@ class MessageQueue {
   bool counted = false;
 
  private:
+  /// Of a message, beside its bytes: its place here, and what its storage takes.
+  static constexpr std::size_t kPlaceBytes = 160;
+
   [[nodiscard]] bool is_full() const;
-  void make_room(std::size_t messages);
+  /// Until so many messages are left, or, of one that grows, as many as cost so much with `more`.
+  void make_room(std::size_t messages, std::size_t more_bytes);
+  /// The first one is about to be taken out.
+  void leave_first();
+  /// The cost of a message beside its neighbour, which may be null.
+  [[nodiscard]] static std::size_t cost_of(const Message& message, const Message* neighbour);
   void count_taken(const Message& message);
 
   struct Entry {
@@ -99,9 +123,13 @@ class MessageQueue {
   Inbox& inbox_;
   const std::size_t bytes_max_;
   QueueOptions options_;
-  std::deque<Entry> entries_;  ///< Limit: bytes_max_ and the options' messages
+  bool grows_ = false;
+  /// Limit: the options' messages; of one that grows also cost_bytes_max_
+  std::deque<Entry> entries_;
   std::vector<TakenMessages> taken_;
   std::size_t bytes_ = 0;
+  std::size_t cost_bytes_ = 0;
+  std::size_t cost_bytes_max_ = 0;  ///< of one that grows
   std::uint64_t received_ = 0;
   std::uint64_t overwritten_ = 0;
   Timeout silence_{0};

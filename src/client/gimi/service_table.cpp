@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "client/gimi/connection_events.hpp"
 #include "client/gimi/ending.hpp"
 
 namespace gimnet::gimi {
@@ -380,6 +381,8 @@ void ServiceTable::on_reconnected() {
 void ServiceTable::tell_missed() {
   const MutexLock lock(mutex_);
   for (auto& [name, service] : subscribed_) {
+    if (const auto news = service->news_of_missed(); !news.empty())
+      log_info(uplink_.node_name(), news);
     const std::uint64_t total = service->missed_in_all();
     if (total == service->missed_told || service->place.group == 0) continue;
     if (uplink_.tell_missed(service->place.group, total)) service->missed_told = total;

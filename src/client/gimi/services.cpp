@@ -16,10 +16,11 @@ Share Subscriber::share() const {
   return wanted;
 }
 
-QueueOptions Subscriber::queue_options(bool latest) const {
+QueueTerms Subscriber::queue_terms(bool latest) const {
   if (wish.newest_only || (wish.queue == 0 && (latest || wish.rate_hz > 0.0)))
-    return {1, AtFullQueue::overwrite_oldest};
-  return {wish.queue, wish.at_full};
+    return {{1, AtFullQueue::overwrite_oldest}};
+  const bool any = wish.queue == 0 && wish.at_full == AtFullQueue::overwrite_oldest;
+  return {{wish.queue, wish.at_full}, any};
 }
 
 SubscribedService::SharedSubscriber SubscribedService::add(const SubscribeOptions& wish) {
@@ -77,14 +78,27 @@ std::uint64_t SubscribedService::missed(const Subscriber& subscriber) {
   return subscriber.numbers.count();
 }
 
+std::uint64_t SubscribedService::missed_by(const Subscriber& subscriber) {
+  const std::uint64_t overwritten = inbox_.counts(subscriber.queue).overwritten;
+  return subscriber.wish.rate_hz == 0.0 ? overwritten + subscriber.numbers.count() : overwritten;
+}
+
 std::uint64_t SubscribedService::missed_in_all() {
   const MutexLock lock(mutex_);
   std::uint64_t sum = 0;
-  for (const SharedSubscriber& each : subscribers_) {
-    sum += inbox_.counts(each->queue).overwritten;
-    if (each->wish.rate_hz == 0.0) sum += each->numbers.count();
-  }
+  for (const SharedSubscriber& each : subscribers_) sum += missed_by(*each);
   return sum;
+}
+
+std::string SubscribedService::news_of_missed() {
+  const MutexLock lock(mutex_);
+  std::uint64_t sum = 0;
+  for (const SharedSubscriber& each : subscribers_) {
+    const bool wants_all = !latest_ && !each->wish.newest_only && each->wish.rate_hz == 0.0;
+    if (wants_all) sum += missed_by(*each);
+  }
+  if (sum <= std::exchange(missed_news_, sum)) return {};
+  return name_->text + ": " + std::to_string(sum) + " messages were missed so far";
 }
 
 const char* SubscribedService::gives_none() {
@@ -202,7 +216,7 @@ void SubscribedService::on_place(const ServicePlace& now) {
   answers_ = accepts_ && now.key.type == proto::gimi::kRequestType;
   if (now.group != 0 && std::exchange(latest_, now.latest) != now.latest) {
     for (const SharedSubscriber& subscriber : subscribers_)
-      inbox_.set(subscriber->queue, subscriber->queue_options(latest_));
+      inbox_.set(subscriber->queue, subscriber->queue_terms(latest_));
   }
   refusal_.reset();
   changed_.notify_all();

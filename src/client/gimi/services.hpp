@@ -39,14 +39,14 @@ struct Share {
 /// outlives it.
 struct Subscriber {
   Subscriber(Inbox& inbox, const SubscribeOptions& options, bool latest)
-      : wish(options), queue(inbox.add_queue(queue_options(latest), options.silence)) {}
+      : wish(options), queue(inbox.add_queue(queue_terms(latest), options.silence)) {}
   ~Subscriber() { queue.inbox().remove(queue); }
   Subscriber(const Subscriber&) = delete;
   Subscriber& operator=(const Subscriber&) = delete;
 
   [[nodiscard]] Share share() const;
   /// `latest`: of a service with that delivery.
-  [[nodiscard]] QueueOptions queue_options(bool latest) const;
+  [[nodiscard]] QueueTerms queue_terms(bool latest) const;
 
   const SubscribeOptions wish;
   MessageQueue& queue;
@@ -86,6 +86,8 @@ class SubscribedService {
   /// All that its subscribers missed, as its hub is told: without those that did not come to a
   /// subscriber that wants no more than a rate.
   [[nodiscard]] std::uint64_t missed_in_all() GIMNET_EXCLUDES(mutex_);
+  /// Words for people if those that want every message missed more than at the last call; else "".
+  [[nodiscard]] std::string news_of_missed() GIMNET_EXCLUDES(mutex_);
 
   // ---- where it is
 
@@ -152,6 +154,8 @@ class SubscribedService {
   [[nodiscard]] Share widest_share() const GIMNET_REQUIRES(mutex_);
   /// The queues of those that want a lower rate than the hub may send keep it themselves.
   void pace_queues() GIMNET_REQUIRES(mutex_);
+  /// Of one subscriber, as missed_in_all().
+  [[nodiscard]] std::uint64_t missed_by(const Subscriber& subscriber) GIMNET_REQUIRES(mutex_);
   /// One of its messages is about to be put into queues: whoever takes it knows what is missing
   /// before it.
   void count_missed(const Position& message) GIMNET_REQUIRES(mutex_);
@@ -180,6 +184,7 @@ class SubscribedService {
   Position last_ GIMNET_GUARDED_BY(mutex_);
   Position counted_ GIMNET_GUARDED_BY(mutex_);             ///< by count_missed(), last
   std::vector<Stream> streams_ GIMNET_GUARDED_BY(mutex_);  ///< the one that began last is the last
+  std::uint64_t missed_news_ GIMNET_GUARDED_BY(mutex_) = 0;  ///< that news_of_missed() told
   Ending end_ GIMNET_GUARDED_BY(mutex_);
 };
 

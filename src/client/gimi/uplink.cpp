@@ -153,6 +153,13 @@ std::optional<nif::HubClock::OwnTime> Uplink::own_time(std::int64_t hub_ns) cons
   return direct == nullptr ? std::nullopt : direct->clock().own_time(hub_ns);
 }
 
+std::string Uplink::node_name() const {
+  nif_info info{};
+  info.struct_size = sizeof info;
+  static_cast<void>(nif_get_info(node(), &info));
+  return *info.name != '\0' ? info.name : Peer{info.id}.text();
+}
+
 std::string Uplink::trouble() const {
   std::string words(NIF_SENTENCE_BYTES_MAX, '\0');
   // It may be another, longer one by now.

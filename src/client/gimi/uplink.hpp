@@ -89,6 +89,8 @@ class Uplink {
   /// As HubClock::own_time().
   [[nodiscard]] std::optional<nif::HubClock::OwnTime> own_time(std::int64_t hub_ns) const;
 
+  /// The node's name, or its id, for people.
+  [[nodiscard]] std::string node_name() const;
   /// nif_last_error(), whole.
   [[nodiscard]] std::string trouble() const;
 

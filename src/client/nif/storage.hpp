@@ -58,19 +58,23 @@ class Storage {
     return references_.load(std::memory_order_acquire) ==
            1;  // partner: the fetch_sub of the others' release()
   }
+  /// Bytes of memory that many received things share, and that the last of them frees; 0: each has
+  /// its own.
+  [[nodiscard]] std::uint32_t shared_bytes() const { return shared_bytes_; }
 
  protected:
-  Storage() = default;
+  explicit Storage(std::uint32_t shared_bytes = 0) : shared_bytes_(shared_bytes) {}
   virtual ~Storage() = default;
 
  private:
   std::atomic<std::uint32_t> references_{1};
+  const std::uint32_t shared_bytes_;
 };
 
 /// The memory that the socket is read into: many frames behind each other.
 class Slab final : public Storage {
  public:
-  static constexpr std::size_t kBytes = 256 * 1024;
+  static constexpr std::uint32_t kBytes = 256 * 1024;
   /// Null: no memory.
   [[nodiscard]] static Slab* make() {
     auto* memory = new (std::nothrow) std::byte[kBytes];
@@ -82,7 +86,7 @@ class Slab final : public Storage {
   [[nodiscard]] std::byte* bytes() { return bytes_; }
 
  private:
-  explicit Slab(std::byte* memory) : bytes_(memory) {}
+  explicit Slab(std::byte* memory) : Storage(kBytes), bytes_(memory) {}
   ~Slab() override { delete[] bytes_; }
   std::byte* const bytes_;
 };

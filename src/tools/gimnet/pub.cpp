@@ -29,6 +29,8 @@ namespace {
 
 /// The last lines may take this long to leave.
 constexpr Timeout kDrain{10'000};
+/// The hub may take this long to say what it knows already.
+constexpr Timeout kMissedAnswer{500};
 /// The library may take this long to say why.
 constexpr std::int64_t kWhyNs = 1'000'000'000;
 /// The time between two looks at the connection.
@@ -171,6 +173,18 @@ Outcome<void> wait_for_subscribers(const ToolSession& session, const Publisher& 
   }
 }
 
+/// Says what the hub knows now of messages that subscribers missed. Their libraries tell it once a
+/// second, for which nobody waits.
+void tell_missed(ToolSession& session) {
+  const ToolOptions& options = session.options();
+  // Of `latest` those count too that a newer one replaced, as it should be.
+  if (options.delivery == Delivery::latest) return;
+  const auto services = session.node().services(options.target, kMissedAnswer);
+  if (!services || services->empty() || services->front().missed == 0) return;
+  say("subscribers missed " + std::to_string(services->front().missed) +
+      " or more: they read more slowly than this publishes (--rate HZ helps), or a link broke");
+}
+
 /// The service stands, and with it what is retained, until a signal comes or the hub wants this
 /// node no more.
 Outcome<void> stay(ToolSession& session, const Publisher& publisher, Standing& standing,
@@ -221,6 +235,7 @@ ExitCode run_pub(ToolSession& session) {
   // A retained line is for those that come later.
   const std::string unheard_words = unheard.sentence(options.target, options.subscribers > 0);
   if (sent && !session.stopped() && !options.retain && !unheard_words.empty()) say(unheard_words);
+  if (sent && !session.stopped()) tell_missed(session);
   write_counts(session, *publisher);
   if (sent && options.stay && !session.stopped())
     sent = stay(session, *publisher, standing, retaining);

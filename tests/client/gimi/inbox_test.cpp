@@ -53,6 +53,47 @@ TEST_F(InboxTest, SaysWhenTheTimeIsUp) {
   EXPECT_FALSE(inbox_.try_receive(inbox_.queue({1, 0}, nullptr)));
 }
 
+class GrowingQueuesTest : public InboxTest {
+ protected:
+  static constexpr std::size_t kSize = 100'000;
+  static constexpr std::size_t kPlace = 160;  ///< that a message takes beside its bytes
+
+  MessageQueue& add() { return inbox_.add_queue({{}, true}); }
+  void fill(MessageQueue& queue) {
+    for (int i = 0; i < 200; ++i) {
+      Message message = test::make_stored(kSize, nullptr);
+      ASSERT_TRUE(inbox_.put(queue, message, nullptr));
+    }
+  }
+};
+
+TEST_F(GrowingQueuesTest, TakeSoManyBytesAlone) {
+  MessageQueue& queue = add();
+  fill(queue);
+  EXPECT_EQ(queue.size(), GrowingQueues::kQueueBytesMax / (kSize + kPlace));
+  EXPECT_EQ(queue.overwritten(), 200 - queue.size());
+  for (int i = 0; i < 200; ++i) EXPECT_TRUE(put({1, 0}));
+  EXPECT_EQ(inbox_.queue({1, 0}, nullptr).size(), 2u) << "one of a key does not grow";
+}
+
+TEST_F(GrowingQueuesTest, ShareTheBytesOfAllOfThem) {
+  std::vector<MessageQueue*> queues;
+  for (int i = 0; i < 4; ++i) queues.push_back(&add());
+  for (MessageQueue* queue : queues) fill(*queue);
+  EXPECT_EQ(queues.back()->size(), GrowingQueues::kQueueBytesMax / (kSize + kPlace));
+  for (int i = 0; i < 4; ++i) queues.push_back(&add());
+  const std::size_t half = GrowingQueues::kQueueBytesMax / 2 / (kSize + kPlace);
+  EXPECT_EQ(queues.front()->size(), half) << "at once";
+  for (int i = 0; i < 992; ++i) queues.push_back(&add());
+  EXPECT_EQ(queues.front()->size(), kQueueMessagesDefault) << "so many in any case";
+  for (; queues.size() > 8; queues.pop_back()) inbox_.remove(*queues.back());
+  fill(*queues.front());
+  EXPECT_EQ(queues.front()->size(), half);
+  for (; queues.size() > 2; queues.pop_back()) inbox_.resize(*queues.back(), 10);
+  fill(*queues.front());
+  EXPECT_EQ(queues.front()->size(), 2 * half + 1) << "those with a wish do not count";
+}
+
 TEST(PacedQueue, GetsTheNewestAtEachDueTime) {
   std::atomic<int> roused = 0;
   Inbox inbox(2, 1000, [] {}, {}, {[&] { ++roused; }, [] {}});
@@ -85,7 +126,7 @@ TEST(PacedQueue, GetsTheNewestAtEachDueTime) {
 
 TEST(PacedQueue, GivesOutWhatFoundNoRoomBeforeTheEnd) {
   Inbox inbox(2, 1000, [] {});
-  MessageQueue& paced = inbox.add_queue({1, AtFullQueue::stop_reading});
+  MessageQueue& paced = inbox.add_queue({{1, AtFullQueue::stop_reading}});
   inbox.pace(paced, 0.001);
   for (std::uint32_t sequence = 1; sequence <= 2; ++sequence) {
     Message message = make_message("x", sequence);
@@ -127,7 +168,7 @@ TEST_F(InboxTest, WakesWhoWaits) {
 
 TEST_F(InboxTest, AQueueThatNobodyReadsAnyMoreHoldsNobodyUp) {
   const QueueOptions options{1, AtFullQueue::stop_reading};
-  MessageQueue& queue = inbox_.add_queue(options);
+  MessageQueue& queue = inbox_.add_queue({options});
   Message first = make_message("x", 1);
   Message second = make_message("x", 2);
   EXPECT_TRUE(inbox_.put(queue, first, nullptr));
@@ -166,8 +207,8 @@ TEST(Inbox, CountsWhatWaitsInAQueueThatGoesAsTaken) {
 TEST(Inbox, PutsAMessageIntoAllQueuesOrNone) {
   std::uint32_t taken = 0;
   Inbox inbox(2, 1000, [] {}, [&taken](const TakenMessages& some, bool) { taken += some.count; });
-  MessageQueue& one = inbox.add_queue({4, AtFullQueue::stop_reading});
-  MessageQueue& other = inbox.add_queue({1, AtFullQueue::stop_reading});
+  MessageQueue& one = inbox.add_queue({{4, AtFullQueue::stop_reading}});
+  MessageQueue& other = inbox.add_queue({{1, AtFullQueue::stop_reading}});
   const std::array queues{&one, &other};
   Message message = make_counted(11, 1);
   EXPECT_TRUE(inbox.put_in_all(queues, message));
@@ -233,7 +274,7 @@ TEST(Inbox, TellsWhatWasTakenOfAWindowWhicheverWayItWent) {
         told.push_back(std::to_string(taken.group) + "x" + std::to_string(taken.count) +
                        (more ? "+" : ""));
       });
-  MessageQueue& queue = inbox.add_queue({2, AtFullQueue::overwrite_oldest});
+  MessageQueue& queue = inbox.add_queue({{2, AtFullQueue::overwrite_oldest}});
   const auto put = [&](std::uint32_t group) {
     Message message = make_counted(group, 1);
     EXPECT_TRUE(inbox.put(queue, message, nullptr));
@@ -260,7 +301,7 @@ TEST(Inbox, TellsWhatWasMissedAtMostOnceASecond) {
   int begun = 0;
   int told = 0;
   Inbox inbox(2, 1000, [] {}, {}, {[&begun] { ++begun; }, [&told] { ++told; }});
-  MessageQueue& queue = inbox.add_queue({1, AtFullQueue::overwrite_oldest});
+  MessageQueue& queue = inbox.add_queue({{1, AtFullQueue::overwrite_oldest}});
   const auto put = [&] {
     Message message = make_message("x", 1, {});
     EXPECT_TRUE(inbox.put(queue, message, nullptr));

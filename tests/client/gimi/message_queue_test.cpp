@@ -2,7 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
+#include <initializer_list>
+
 #include "client/gimi/inbox.hpp"
+#include "client/nif/storage.hpp"
 #include "tests/client/gimi/support/made_message.hpp"
 
 namespace gimnet::gimi {
@@ -16,7 +20,7 @@ constexpr std::size_t kBytesMax = 100;
 class MessageQueueTest : public testing::Test {
  protected:
   Inbox inbox_{64, kBytesMax, [] {}};
-  MessageQueue queue_{inbox_, {3, AtFullQueue::overwrite_oldest}, kBytesMax};
+  MessageQueue queue_{inbox_, {{3, AtFullQueue::overwrite_oldest}}, kBytesMax};
 };
 
 TEST_F(MessageQueueTest, GivesTheOldestFirst) {
@@ -68,7 +72,7 @@ TEST_F(MessageQueueTest, HoldsTheNewestUntilItIsDue) {
 }
 
 TEST_F(MessageQueueTest, OneThatIsPacedRefusesNothing) {
-  queue_.set({1, AtFullQueue::stop_reading});
+  queue_.set({{1, AtFullQueue::stop_reading}});
   queue_.push(make_message("x", 1), 1);
   EXPECT_TRUE(queue_.refuses());
   queue_.pace(100, 5000);
@@ -98,12 +102,12 @@ TEST_F(MessageQueueTest, ChangesItsSizeWhileItRuns) {
 }
 
 TEST_F(MessageQueueTest, RefusesAtItsLimitsIfItIsToldTo) {
-  queue_.set({2, AtFullQueue::stop_reading});
+  queue_.set({{2, AtFullQueue::stop_reading}});
   queue_.push(make_message("a"), 1);
   EXPECT_FALSE(queue_.refuses());
   queue_.push(make_message("b"), 2);
   EXPECT_TRUE(queue_.refuses());
-  queue_.set({10, AtFullQueue::stop_reading});
+  queue_.set({{10, AtFullQueue::stop_reading}});
   EXPECT_FALSE(queue_.refuses());
   const std::string large(kBytesMax, 'x');
   queue_.push(make_message(large), 3);
@@ -154,6 +158,60 @@ TEST_F(MessageQueueTest, CountsEachGroupAndEpochByItself) {
   queue_.resize(1);
   static_cast<void>(queue_.pop());
   EXPECT_EQ(taken_of(queue_), "") << "without an epoch nothing counts";
+}
+
+TEST_F(MessageQueueTest, OneThatGrowsHoldsMoreWhileTheyCostLittle) {
+  queue_.set({{3, AtFullQueue::overwrite_oldest}, true});
+  queue_.allow(10 * (160 + 1));
+  for (std::uint32_t number = 1; number <= 12; ++number)
+    queue_.push(make_message("x", number), number);
+  EXPECT_EQ(queue_.size(), 10u);
+  EXPECT_EQ(queue_.cost_bytes(), 10u * (160 + 1));
+  EXPECT_EQ(queue_.overwritten(), 2u);
+  queue_.push(make_message("four", 13), 13);
+  EXPECT_EQ(queue_.size(), 9u) << "3 bytes more than one of the former ones";
+  queue_.allow(5 * (160 + 1) + 3);
+  EXPECT_EQ(queue_.size(), 5u);
+  queue_.allow(0);
+  EXPECT_EQ(queue_.size(), 3u) << "whatever they cost";
+  EXPECT_EQ(queue_.pop()->sequence(), 11u);
+  queue_.set({{2, AtFullQueue::overwrite_oldest}});
+  EXPECT_EQ(queue_.size(), 2u);
+}
+
+TEST_F(MessageQueueTest, MessagesOfOneSlabBehindEachOtherShareIt) {
+  constexpr std::size_t kPlace = 160;
+  nif::Slab* const one = nif::Slab::make();
+  nif::Slab* const other = nif::Slab::make();
+  auto* const alone = new nif::Record;
+  queue_.set({{2, AtFullQueue::overwrite_oldest}, true});
+  queue_.allow(SIZE_MAX);
+  for (nif::Storage* const storage :
+       std::initializer_list<nif::Storage*>{one, one, other, alone, one})
+    queue_.push(test::make_stored(10, storage), 1);
+  EXPECT_EQ(queue_.cost_bytes(), 5 * (kPlace + 10) + 3 * nif::Slab::kBytes)
+      << "one has come back behind others";
+  EXPECT_TRUE(queue_.pop());
+  EXPECT_EQ(queue_.cost_bytes(), 4 * (kPlace + 10) + 3 * nif::Slab::kBytes);
+  EXPECT_EQ(queue_.overwrite_oldest(), 10u);
+  EXPECT_EQ(queue_.cost_bytes(), 3 * (kPlace + 10) + 2 * nif::Slab::kBytes);
+  EXPECT_TRUE(queue_.pop());
+  EXPECT_EQ(queue_.cost_bytes(), 2 * (kPlace + 10) + nif::Slab::kBytes);
+  EXPECT_TRUE(queue_.pop_newest());
+  EXPECT_EQ(queue_.cost_bytes(), 0u);
+  for (nif::Storage* const storage : std::initializer_list<nif::Storage*>{one, other, alone})
+    storage->release();
+}
+
+TEST_F(MessageQueueTest, OneThatGrowsCountsTheSlabsThatItKeeps) {
+  queue_.set({{3, AtFullQueue::overwrite_oldest}, true});
+  queue_.allow(5 * (nif::Slab::kBytes + 160));
+  for (int i = 0; i < 10; ++i) {
+    nif::Slab* const slab = nif::Slab::make();
+    queue_.push(test::make_stored(0, slab), 1);
+    slab->release();
+  }
+  EXPECT_EQ(queue_.size(), 5u);
 }
 
 }  // namespace

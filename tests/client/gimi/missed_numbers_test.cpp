@@ -78,8 +78,8 @@ TEST(MissedNumbers, CountOneThatWillNotComeOnce) {
   EXPECT_EQ(numbers.count(), 1u);
 }
 
-/// What one subscriber has to count: numbers that were left out since it began, unless they came
-/// while they were among the last ones.
+/// The count that one subscriber has to have: numbers that were left out since it began, unless
+/// they came while they were among the last ones.
 class Truth {
  public:
   void begin(std::uint64_t number) {

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdlib>
 #include <optional>
 #include <string>
 #include <thread>
@@ -29,7 +30,8 @@ constexpr Timeout kWait = std::chrono::duration_cast<Timeout>(test::kPatience);
 
 using Texts = std::vector<std::string>;
 
-constexpr int kMessages = 80;  ///< more than a queue has places without a wish
+constexpr int kMessages = 80;  ///< more than a queue of a key has places without a wish
+constexpr int kBurst = 20'000;
 constexpr std::uint32_t kWindow = 3;
 constexpr double kRate = 5.0;
 
@@ -100,10 +102,25 @@ class Wishes : public testing::Test {
 
 TEST_F(Wishes, OfAStream) {
   offer(Delivery::stream);
-  EXPECT_EQ(take_slow({}), numbers(kMessages - 63, kMessages)) << "64 places";
+  EXPECT_EQ(take_slow({}), numbers(1, kMessages));
+  EXPECT_EQ(take_slow({.queue = 64}), numbers(kMessages - 63, kMessages)) << "64 places";
   EXPECT_EQ(take_slow({.newest_only = true}), numbers(kMessages, kMessages));
   EXPECT_EQ(take_slow({.queue = 100}), numbers(1, kMessages));
   expect_newest_when_due();
+}
+
+TEST_F(Wishes, WithoutOneAStreamHoldsABurstForAProgramThatReadsNothing) {
+  offer(Delivery::stream);
+  const Subscription all = subscribe({});
+  for (int i = 1; i <= kBurst; ++i) publish(i);
+  ASSERT_TRUE(eventually([&] { return all.queue().size() == kBurst; }));
+  EXPECT_EQ(all.missed(), 0u);
+  EXPECT_EQ(all.receive(kNoWait)->text(), "1");
+  all.queue().resize(10);
+  EXPECT_EQ(all.queue().size(), 10u);
+  publish(kBurst + 1);
+  ASSERT_TRUE(eventually([&] { return all.queue().received() == kBurst + 1; }));
+  EXPECT_EQ(all.queue().size(), 10u) << "it has a wish now";
 }
 
 TEST_F(Wishes, OfTheLatest) {
@@ -215,6 +232,28 @@ TEST_F(Wishes, WhatTheyMissIsToldToTheHub) {
   EXPECT_EQ(told(), std::pair(std::uint64_t(kMessages) - 1, viewer_.peer()));
   for (const ConnectionRecord& each : robot_.hub_connections(kWait).or_throw())
     EXPECT_EQ(each.missed, each.node == viewer_.peer() ? newest.missed() : 0u);
+}
+
+TEST_F(Wishes, WhatOneMissesThatWantsAllIsToldOnStandardErrorIfThatIsAskedFor) {
+  offer(Delivery::stream);
+  ASSERT_EQ(setenv("GIMNET_LOG", "info", 1), 0);
+  testing::internal::CaptureStderr();
+  {
+    const Subscription newest = subscribe({.newest_only = true});
+    publish_slowly(newest);
+    EXPECT_TRUE(eventually([&] { return robot_.services("robot/eye")->at(0).missed != 0; }));
+  }
+  std::string said = testing::internal::GetCapturedStderr();
+  EXPECT_EQ(said.find("missed"), std::string::npos) << said;
+  testing::internal::CaptureStderr();
+  const Subscription two = subscribe({.queue = 2});
+  publish_slowly(two);
+  const auto is_told = [&] { return robot_.services("robot/eye")->at(0).missed == two.missed(); };
+  EXPECT_TRUE(eventually(is_told));
+  said = testing::internal::GetCapturedStderr();
+  unsetenv("GIMNET_LOG");
+  EXPECT_NE(said.find(": robot/eye: "), std::string::npos) << said;
+  EXPECT_NE(said.find(" messages were missed so far\n"), std::string::npos) << said;
 }
 
 TEST_F(Wishes, OneThatIsNotTakenHoldsNoOtherOfThatServiceUp) {

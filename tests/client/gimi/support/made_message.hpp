@@ -36,4 +36,15 @@ inline Message make_message(std::string_view text, std::uint32_t sequence = 1, M
   return gimi::make_message(in, view, name.get(), reconnects);
 }
 
+/// A message of so many bytes, which are nowhere, in that storage, of which it has a reference.
+inline Message make_stored(std::size_t size, nif::Storage* storage) {
+  nif_incoming in{};
+  in.storage = storage;
+  if (storage != nullptr) storage->add_reference();
+  proto::gimi::MessageView view;
+  static constexpr std::byte kNothing{};
+  view.data = {&kNothing, size};
+  return gimi::make_message(in, view, nullptr, 0);
+}
+
 }  // namespace gimnet::test
