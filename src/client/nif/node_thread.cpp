@@ -204,7 +204,7 @@ void NodeThread::turn() {
   const std::int64_t now = steady_now_ns();
   if (ready.readable) read_some(now);
   if (stream_ == nullptr) return;
-  if (!ready.readable) on_timers(now);
+  on_timers(now, wants.last_write_ns);
   if (stream_ != nullptr) {
     take_new_name();
     parts_.declarations.go_on();
@@ -245,7 +245,6 @@ void NodeThread::take_read(std::size_t bytes, std::int64_t now) {
       break;
     }
   }
-  if (stream_ != nullptr && keep_alive_.is_late(now)) on_timers(now);
 }
 
 void NodeThread::confirm() {
@@ -255,13 +254,14 @@ void NodeThread::confirm() {
   inbound_.confirmed();
 }
 
-void NodeThread::on_timers(std::int64_t now) {
+void NodeThread::on_timers(std::int64_t now, std::int64_t written_ns) {
   if (keep_alive_.silent_for_too_long(now)) {
     disconnect("the hub was silent for too long", proto::GoodbyeCode::silent);
     return;
   }
   if (keep_alive_.is_early(now)) return;
-  const Outbound::Wants wants = parts_.outbound.wants();
+  if (!keep_alive_.ping_due(written_ns, now) && !keep_alive_.is_late(now)) return;
+  const Outbound::Wants wants = parts_.outbound.wants();  // others may have written since
   const bool due = keep_alive_.ping_due(wants.last_write_ns, now);
   if (!due && !keep_alive_.is_late(now)) return;
   keep_alive_.ticked(now);

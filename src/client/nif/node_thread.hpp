@@ -48,7 +48,7 @@ class KeepAliveTimer {
     return reading_ && now_ns - heard_ns_ >= silent_after_ns_;
   }
 
-  /// When to look again, if nothing happens. `write_ns`: of the last write, whatever it was.
+  /// When to look again, if nothing happens. `write_ns`: bytes went last then, whatever they were.
   [[nodiscard]] Deadline next(std::int64_t write_ns) const {
     Deadline next = std::min(tick_ns_, write_ns) + interval_ns_;
     next = std::max(next, tick_ns_ + interval_ns_ / 4);
@@ -58,12 +58,12 @@ class KeepAliveTimer {
   [[nodiscard]] bool is_early(std::int64_t now_ns) const {
     return now_ns - tick_ns_ < interval_ns_ / 4;
   }
-  /// However much there is to read, the rest has to be done now.
+  /// A whole interval has passed: what came is confirmed now, whether a PING is due or not.
   [[nodiscard]] bool is_late(std::int64_t now_ns) const {
     return now_ns - tick_ns_ >= interval_ns_;
   }
 
-  /// A PING is due: nothing was written for a whole interval, or the clock is to be measured.
+  /// A PING is due: no byte went for a whole interval, or the clock is to be measured.
   [[nodiscard]] bool ping_due(std::int64_t write_ns, std::int64_t now_ns) const {
     return now_ns - write_ns >= interval_ns_ ||
            now_ns - ping_ns_ >= kMeasureIntervals * interval_ns_;
@@ -124,7 +124,9 @@ class NodeThread {
   void turn();
   void read_some(std::int64_t now);
   void take_read(std::size_t bytes, std::int64_t now);
-  void on_timers(std::int64_t now);
+  /// In each turn, however much there is to read: keeps alive, confirms, notices silence.
+  /// `written_ns`: bytes went then, or later.
+  void on_timers(std::int64_t now, std::int64_t written_ns);
   void run_task() GIMNET_EXCLUDES(task_mutex_);
   void redial();
   void disconnect(std::string why, proto::GoodbyeCode code);

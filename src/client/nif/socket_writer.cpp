@@ -90,6 +90,7 @@ void SocketWriter::end_writing() {
 
 void SocketWriter::write_rounds(bool by_library, Mutex& mutex) {
   writing_ = true;
+  const std::uint64_t sent_before = bytes_sent_;
   // Messages that came during the write of a burst are gathered again, after a look at the socket.
   const int rounds_max = by_library && gather_burst(mutex) ? 1 : kWriteRoundsMax;
   int rounds = 0;
@@ -98,7 +99,8 @@ void SocketWriter::write_rounds(bool by_library, Mutex& mutex) {
          write_once(mutex))
     ++rounds;
   end_writing();
-  last_write_ns_ = steady_now_ns();
+  // A write of nothing tells the hub nothing: keep-alive must not count it.
+  if (bytes_sent_ != sent_before) last_write_ns_ = steady_now_ns();
   const bool more =
       rounds >= rounds_max && (!parts_.queue.all_written() || parts_.source.has_more());
   // The library's thread sees for itself that the kernel is full: waking it would only make it try

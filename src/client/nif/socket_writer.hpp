@@ -111,11 +111,11 @@ class SocketWriter {
   }
   /// The state of writing, by which the library's thread waits.
   struct Wants {
-    bool blocked = false;         ///< the kernel was full
-    std::size_t pending_out = 0;  ///< as Stream::pending_out(); 0 while somebody writes
-    bool broken = false;          ///< a write failed
-    bool no_memory = false;       ///< because there was no memory for it
-    std::int64_t last_write_ns = 0;
+    bool blocked = false;            ///< the kernel was full
+    std::size_t pending_out = 0;     ///< as Stream::pending_out(); 0 while somebody writes
+    bool broken = false;             ///< a write failed
+    bool no_memory = false;          ///< because there was no memory for it
+    std::int64_t last_write_ns = 0;  ///< when bytes went last
   };
   [[nodiscard]] Wants wants() const;
   [[nodiscard]] std::uint64_t bytes_sent() const { return bytes_sent_; }

@@ -190,6 +190,7 @@ struct Connection : Recipient {
   IngressState ingress;
   std::uint64_t last_heard_ms = 0;
   std::uint64_t last_sent_ms = 0;
+  std::uint64_t last_ping_ms = 0;  ///< when Keeper said PING last
   std::uint64_t tail_since_ms = 0;
   std::uint64_t sent_bytes = 0;
   std::unique_ptr<Progress> progress;  ///< while something waits

@@ -110,7 +110,14 @@ void Keeper::look_at(Connection& connection) {
     if (!connection.connected) return;
     if (connection.resume) send_confirm(state_, connection);
   }
+  if (heard) ask_if_silent(connection);
   flusher_.look_after(connection);
+}
+
+void Keeper::ask_if_silent(Connection& connection) {
+  const bool asked = connection.last_ping_ms > connection.last_heard_ms;
+  if (asked || connection.write == WriteState::failed) return;
+  if (state_.now_ms - connection.last_heard_ms >= silent_ms(connection) / 2) say_ping(connection);
 }
 
 std::uint64_t Keeper::silent_ms(const Connection& connection) const {
@@ -141,7 +148,9 @@ void Keeper::end_if_quiet(Connection& connection) {
 /// its end, and the shard would keep all of it.
 void Keeper::say_ping(Connection& connection) {
   const proto::flow::Ping ping{++connection.ping_sequence, wall_now_ns()};
-  if (push_flow(state_, connection, ping)) flusher_.flush(connection);
+  if (!push_flow(state_, connection, ping)) return;
+  connection.last_ping_ms = state_.now_ms;
+  flusher_.flush(connection);
 }
 
 void Keeper::drain(std::uint64_t deadline_ms) {

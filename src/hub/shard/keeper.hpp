@@ -47,6 +47,9 @@ class Keeper {
   /// by what is.
   [[nodiscard]] bool is_silent(Connection& connection);
   void say_ping(Connection& connection);
+  /// Says one PING to a node that was not heard for half of silent_ms, whatever the hub sends:
+  /// a library that is busy reading may say nothing by itself, but answers a PING.
+  void ask_if_silent(Connection& connection);
 
   ShardState& state_;
   Closer& closer_;

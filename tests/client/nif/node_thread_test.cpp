@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "client/nif/handles.hpp"
@@ -134,6 +135,37 @@ TEST(NodeThread, RunsATaskWhileAHubDoesNotAnswer) {
   FakeConnection silent = hub.accept();
   ASSERT_TRUE(silent.read_hello());
   EXPECT_TRUE(task.runs(3, silent)) << "before it gives up";
+}
+
+// Its own thread is woken all the time, and always has something to read.
+TEST(NodeThread, KeepsAliveWhileAFloodComes) {
+  constexpr std::int64_t kIntervalNs = 200 * kNsPerMs;
+  FakeHub hub;
+  nif_options options = default_options();
+  options.callback = [](void*, const nif_incoming*) { return NIF_DONE; };
+  proto::Welcome welcome = make_welcome();
+  welcome.keep_alive_ms = kIntervalNs / kNsPerMs;
+  Connected connected = connect_to(hub, options, welcome);
+  Node* const node = share_node(connected.node.get());
+  std::atomic<bool> over{false};
+  std::thread flood([&] {
+    while (!over.load()) {
+      for (int i = 0; i < 100; ++i) connected.hub.send_unicast(kPeerId, kOwnId, "flood");
+      node->thread().rouse();
+    }
+  });
+  // Each five intervals it sends one in any case, to measure the hub's clock.
+  const Deadline until = steady_now_ns() + std::chrono::nanoseconds(kPatience).count();
+  int in_time = 0;
+  for (std::int64_t last = INT64_MIN / 2; in_time < 3 && steady_now_ns() < until;) {
+    if (!connected.hub.next_flow<proto::flow::Ping>()) break;
+    const std::int64_t apart_ns = steady_now_ns() - std::exchange(last, steady_now_ns());
+    in_time = apart_ns < 3 * kIntervalNs ? in_time + 1 : 0;
+  }
+  EXPECT_EQ(in_time, 3) << "one after the other";
+  over.store(true);
+  flood.join();
+  node->drop();
 }
 
 TEST(NodeThread, LeavesAHubThatIsSilent) {

@@ -104,6 +104,25 @@ TEST(SocketWriter, NothingIsWrittenToAFullKernelUntilItIsWritable) {
   EXPECT_FALSE(line.writer.wants().blocked);
 }
 
+// Keep-alive goes by it, and the library's thread is woken for much else.
+TEST(SocketWriter, OnlyBytesThatWentCountAsAWrite) {
+  Writing line;
+  std::int64_t now_ns = steady_now_ns();
+  const OwnClock clock([&] { return now_ns; });
+  line.send("one");
+  const std::int64_t written_ns = now_ns;
+  EXPECT_EQ(line.writer.wants().last_write_ns, written_ns);
+  now_ns += 1'000'000;
+  line.write_pending(false);
+  EXPECT_EQ(line.writer.wants().last_write_ns, written_ns) << "nothing waited";
+  line.stream.room = 0;
+  line.send("two");
+  EXPECT_EQ(line.writer.wants().last_write_ns, written_ns) << "the kernel took nothing";
+  line.stream.room = SIZE_MAX;
+  line.write_pending(true);
+  EXPECT_EQ(line.writer.wants().last_write_ns, now_ns);
+}
+
 TEST(SocketWriter, ABurstIsLeftToTheLibrarysThread) {
   Writing line;
   Texts left = line.send_burst();
