@@ -40,7 +40,7 @@ typedef struct nif_counters {
    * no memory. */
   uint64_t last_messages_not_kept;
   /** Frames of other nodes that could not be read, and were dropped: a header, extension or TAKEN
-   * that docs/protocol.md does not allow. */
+   * that docs/protocol.md does not allow. REPORTs of other hubs count, too. */
   uint64_t frames_unreadable;
 } nif_counters;
 

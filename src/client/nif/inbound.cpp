@@ -100,10 +100,12 @@ Inbound::Verdict Inbound::take_run(const proto::RunView& run) {
     const auto view = proto::parse_frame({at, left}, proto::Origin::hub);
     if (view) {
       if (const Verdict verdict = take_frame(*view, at); verdict != Verdict::going) return verdict;
-    } else {
-      if (!is_of_another_node(proto::load_header(at).kind))
-        return malformed(proto::frame_error_text(view.error()));
+    } else if (const proto::Kind kind = proto::load_header(at).kind; kind == proto::Kind::report) {
+      drop_report();
+    } else if (is_of_another_node(kind)) {
       drop_unreadable(at);
+    } else {
+      return malformed(proto::frame_error_text(view.error()));
     }
     at += proto::load_header(at).frame_size();
   }
@@ -115,6 +117,12 @@ void Inbound::drop_unreadable(const std::byte* frame) {
   ++counts_.frames;
   ++taken_;
   unconfirmed_bytes_ += proto::load_header(frame).frame_size();
+  ++counts_.unreadable;
+}
+
+/// Another hub wrote it. No hub counts REPORTs for resume.
+void Inbound::drop_report() {
+  ++counts_.frames;
   ++counts_.unreadable;
 }
 
@@ -135,9 +143,11 @@ Inbound::Verdict Inbound::take_frame(const proto::FrameView& view, const std::by
 }
 
 Inbound::Verdict Inbound::take_data(const proto::FrameView& view, const std::byte* frame) {
+  if (view.header.kind == proto::Kind::report) {
+    take_report(view);
+    return Verdict::going;
+  }
   ++counts_.frames;
-  if (view.header.kind == proto::Kind::report)
-    return take_report(view);  // the hub's own, not counted for resume
   ++taken_;
   unconfirmed_bytes_ += view.header.frame_size();
   switch (view.header.kind) {
@@ -364,10 +374,12 @@ Inbound::Verdict Inbound::take_name_lost(std::span<const std::byte> payload) {
   return Verdict::goodbye;
 }
 
-Inbound::Verdict Inbound::take_report(const proto::FrameView& view) {
+void Inbound::take_report(const proto::FrameView& view) {
   auto report = proto::decode_report(view.payload);
-  if (!report) return malformed("REPORT is too short");
-  if (host_.on_report(*report)) return Verdict::going;
+  const bool misread = proto::check_header_of_hub_word(view.header) != proto::FrameError::none;
+  if (!report || misread) return drop_report();
+  ++counts_.frames;
+  if (host_.on_report(*report)) return;
   // As if the message had come in one frame: programs know of no fragments.
   const auto start = host_.message_of(*report);
   if (start) {
@@ -375,7 +387,6 @@ Inbound::Verdict Inbound::take_report(const proto::FrameView& view) {
     report->following = *start;
   }
   add_record(make_report(*report, view.header.src), proto::kReportSizeMax);
-  return Verdict::going;
 }
 
 }  // namespace gimnet::nif

@@ -61,7 +61,8 @@ class InboundHost {
 
 /// The receiving half of a node: bytes of the hub in, messages and events out. The hub is not
 /// trusted: whatever it sends either is taken or ends the connection with a sentence. A frame that
-/// another node wrote never ends the connection: if it cannot be read, it is dropped and counted.
+/// another node wrote, or a REPORT, never ends the connection: if it cannot be read, it is dropped
+/// and counted.
 /// Thread safety: the library's thread; no sockets, no clocks. Memory: the read buffer, and
 /// unfinished messages within the reassembly limits.
 class Inbound {
@@ -109,7 +110,7 @@ class Inbound {
     std::uint64_t messages_lost = 0;
     std::uint64_t gaps = 0;
     std::uint64_t ignored = 0;
-    std::uint64_t unreadable = 0;  ///< frames of other nodes
+    std::uint64_t unreadable = 0;  ///< frames of other nodes, and REPORTs
   };
   [[nodiscard]] const Counts& counts() const { return counts_; }
 
@@ -117,6 +118,7 @@ class Inbound {
   [[nodiscard]] Verdict malformed(std::string why);
   [[nodiscard]] Verdict take_run(const proto::RunView& run);
   void drop_unreadable(const std::byte* frame);
+  void drop_report();
   [[nodiscard]] Verdict take_frame(const proto::FrameView& view, const std::byte* frame);
   [[nodiscard]] Verdict take_data(const proto::FrameView& view, const std::byte* frame);
   [[nodiscard]] Verdict take_message(const proto::FrameView& view, const std::byte* frame);
@@ -128,7 +130,7 @@ class Inbound {
                                    std::span<const std::byte> payload);
   [[nodiscard]] Verdict take_watch_events(std::span<const std::byte> payload);
   [[nodiscard]] Verdict take_name_lost(std::span<const std::byte> payload);
-  [[nodiscard]] Verdict take_report(const proto::FrameView& view);
+  void take_report(const proto::FrameView& view);
   [[nodiscard]] bool may_wait(const proto::FrameHeader& header, std::size_t bytes);
   void add_frame(const proto::FrameView& view, const std::byte* frame);
   /// A message whose payload has memory of its own.

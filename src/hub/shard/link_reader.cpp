@@ -79,10 +79,14 @@ bool LinkReader::take(Connection& connection, const proto::RunView& view, Admiss
     case Admission::data:
       break;
   }
-  state_.counters.malformed.add(view.frames);
-  tell_refused(connection, view);
+  refuse(connection, view);
   drop(connection, view, proto::DropReason::malformed);
   return true;
+}
+
+void LinkReader::refuse(const Connection& connection, const proto::RunView& view) {
+  state_.counters.malformed.add(view.frames);
+  tell_refused(connection, view);
 }
 
 void LinkReader::take_control(Connection& connection, const proto::RunView& view) {
@@ -136,11 +140,11 @@ void LinkReader::pass_on_report(const Connection& connection, const proto::RunVi
 void LinkReader::pass_on_flow(const Connection& connection, const proto::RunView& view) {
   const auto message =
       proto::flow::decode({view.bytes + proto::kHeaderSize, view.size - proto::kHeaderSize});
-  if (!message || view.size > proto::flow::kFrameSizeMax) return state_.counters.malformed.add(1);
+  if (!message || view.size > proto::flow::kFrameSizeMax) return refuse(connection, view);
   const proto::flow::Target* target = nullptr;
   if (const auto* pause = std::get_if<proto::flow::Pause>(&*message)) target = &pause->target;
   if (const auto* resume = std::get_if<proto::flow::Resume>(&*message)) target = &resume->target;
-  if (target == nullptr) return state_.counters.malformed.add(1);
+  if (target == nullptr) return refuse(connection, view);
   const NextHop next = state_.shared.routes.find(hub_of(NodeId{target->dst}));
   if (next.exists() && next.neighbour == hub_of(connection.node))
     state_.signals.pass_on({const_cast<std::byte*>(view.bytes), view.size});

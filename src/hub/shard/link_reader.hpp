@@ -23,6 +23,8 @@ class LinkReader {
   void pass_on_report(const Connection& connection, const proto::RunView& view);
   void pass_on_flow(const Connection& connection, const proto::RunView& view);
   void drop(Connection& connection, const proto::RunView& view, proto::DropReason reason);
+  /// Counts a malformed frame, and has it logged.
+  void refuse(const Connection& connection, const proto::RunView& view);
   /// Tells the conductor, at most once a second, of a frame that a link should not have sent.
   void tell_refused(const Connection& connection, const proto::RunView& view);
   /// The first bytes of the frame, for the conductor.

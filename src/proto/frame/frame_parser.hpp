@@ -40,8 +40,9 @@ enum class FrameError : std::uint8_t {
   dst_not_zero,         ///< FLOW or LINK for somebody else than the other end of the connection
   flag_not_allowed,     ///< a flag that this kind may not carry: what follows the header would be
                         ///< misread
+  report_too_short,     ///< REPORT without the header of the frame that it is about
 };
-inline constexpr std::size_t kFrameErrorCount = 20;
+inline constexpr std::size_t kFrameErrorCount = 21;
 
 /// A clause for the sentence of GOODBYE `malformed`, for example "hops is not 0".
 [[nodiscard]] constexpr const char* frame_error_text(FrameError error) {
@@ -65,7 +66,8 @@ inline constexpr std::size_t kFrameErrorCount = 20;
       "a fragment without payload",
       "a fragment ends after the message's total",
       "FLOW and LINK are for this connection only: dst must be 0",
-      "a flag (FRAGMENT, EXT, KEYED) that this kind may not carry"};
+      "a flag (FRAGMENT, EXT, KEYED) that this kind may not carry",
+      "REPORT is too short"};
   const auto index = static_cast<std::size_t>(error);
   return index < kFrameErrorCount ? kTexts[index] : "unknown error";
 }
@@ -199,6 +201,14 @@ enum class Origin : std::uint8_t { node, hub };
   if (header.kind == Kind::list && (header.dst == 0 || header.dst > kListRecipientsMax))
     return FrameError::list_count;
   return FrameError::none;
+}
+
+/// The rules for the header of a REPORT or FLOW of a hub. Nothing stands between it and the
+/// payload.
+[[nodiscard]] constexpr FrameError check_header_of_hub_word(const FrameHeader& header) {
+  if ((header.lane & ~kLaneMask) != 0) return FrameError::reserved_lane_bits;
+  const bool misread = header.has(kFlagFragment | kFlagKeyed | kFlagExt);
+  return misread ? FrameError::flag_not_allowed : FrameError::none;
 }
 
 /// The node ids of a LIST frame, at any alignment. Valid until: the frame's bytes change.

@@ -145,7 +145,7 @@ TEST(HostileHub, FramesWithoutPayloadAreDeliveredEmptyOrEndTheConnection) {
     if (kind == 3) header.dst = 0xFFFF'FFFF;
     const Inbound::Verdict verdict = receiving.feed(header_bytes(header));
     const bool message = kind <= 4;
-    const bool dropped = kind >= 7 && kind < 16;
+    const bool dropped = kind == 5 || (kind >= 7 && kind < 16);
     EXPECT_EQ(verdict, message || dropped ? Inbound::Verdict::going : Inbound::Verdict::malformed)
         << kind;
     EXPECT_EQ(receiving.host.items.size(), message ? 1u : 0u) << kind;
@@ -167,12 +167,39 @@ TEST(HostileHub, NoHeaderMakesItTakeWhatIsNotThere) {
         header.length = 3;
         Receiving receiving;
         const Inbound::Verdict verdict = receiving.feed(header_bytes(header, 3));
-        const bool of_another_node = kind < 16 && kind != 5 && kind != 6;
-        if (of_another_node) {
+        const bool of_another_peer = kind < 16 && kind != 6;
+        if (of_another_peer) {
           EXPECT_EQ(verdict, Inbound::Verdict::going) << kind << " " << flags;
         }
         EXPECT_LE(receiving.host.items.size(), 1u);
         for (const nif_incoming& in : receiving.host.items) EXPECT_LE(in.size, 3u);
+      }
+    }
+  }
+}
+
+// A hub of 0.9.0 passes them on as another hub wrote them, and counts no REPORT for resume.
+TEST(HostileHub, AReportThatCannotBeReadCostsNothing) {
+  for (unsigned flags = 0; flags < 256; ++flags) {
+    for (const unsigned lane : {0u, 1u, 3u, 4u, 255u}) {
+      for (std::uint32_t size = 0; size <= 40; ++size) {
+        proto::FrameHeader header;
+        header.length = size;
+        header.dst = kOwnId;
+        header.src = kHubNode;
+        header.kind = proto::Kind::report;
+        header.flags = static_cast<std::uint8_t>(flags);
+        header.lane = static_cast<std::uint8_t>(lane);
+        std::vector<std::byte> bytes(proto::kHeaderSize + size, std::byte{0x1f});
+        proto::store_header(bytes.data(), header);
+        add_frame(bytes, message_parts(), "behind");
+        Receiving receiving;
+        ASSERT_EQ(receiving.feed(bytes), Inbound::Verdict::going) << flags << ' ' << size;
+        const bool readable = size >= proto::kReportSizeMin && lane < 4 && (flags & 0x38) == 0;
+        EXPECT_EQ(receiving.inbound.counts().unreadable, readable ? 0u : 1u) << flags;
+        EXPECT_EQ(receiving.inbound.counts().frames, 2u);
+        EXPECT_EQ(receiving.inbound.taken(), 1u) << "the message behind it";
+        EXPECT_EQ(receiving.host.texts(), std::vector<std::string>{"behind"});
       }
     }
   }

@@ -79,9 +79,6 @@ TEST(Inbound, EndsOnWhatAHubMayNotSend) {
   proto::FrameHeader flow;
   flow.kind = proto::Kind::flow;
   EXPECT_EQ(verdict_of(flow, ""), Inbound::Verdict::malformed);
-  proto::FrameHeader report;
-  report.kind = proto::Kind::report;
-  EXPECT_EQ(verdict_of(report, ""), Inbound::Verdict::malformed);
   proto::FrameHeader names;
   names.kind = proto::Kind::ns;
   EXPECT_EQ(verdict_of(names, ""), Inbound::Verdict::malformed);

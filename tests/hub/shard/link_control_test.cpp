@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "proto/control/route.hpp"
+#include "proto/frame/report.hpp"
 #include "tests/hub/shard/support/hub_rig.hpp"
 
 // Control frames and REPORTs that come over links.
@@ -17,6 +18,8 @@ using ::testing::SizeIs;
 
 constexpr HubId kNear{20};
 constexpr HubId kFar{30};
+/// The smallest payload of a REPORT.
+const std::string kReport(proto::kReportSizeMin, '\1');
 
 /// A link over which one ROUTE frame came.
 struct RouteFrame {
@@ -70,7 +73,7 @@ TEST(LinkControl, CountsAReportForALinkThatBroke) {
   rig.command(0, CloseCommand{far.session, proto::GoodbyeCode::silent, ""});
   rig.settle();
   const std::uint32_t src = make_id<NodeId>(kNear, kHubIndex).value();
-  rig.send(near, make_id<NodeId>(kFar, 5).value(), "a report", {.kind = Kind::report, .src = src});
+  rig.send(near, make_id<NodeId>(kFar, 5).value(), kReport, {.kind = Kind::report, .src = src});
   rig.settle();
   EXPECT_EQ(rig.sum(&ShardCounters::reports_lost), 1u);
 }
@@ -82,8 +85,7 @@ TEST(LinkControl, CountsReportsThatWaitForALinkThatBreaks) {
   far.pipe.set_room(0);
   const std::uint32_t src = make_id<NodeId>(kNear, kHubIndex).value();
   for (int i = 0; i < 3; ++i)
-    rig.send(near, make_id<NodeId>(kFar, 5).value(), "a report",
-             {.kind = Kind::report, .src = src});
+    rig.send(near, make_id<NodeId>(kFar, 5).value(), kReport, {.kind = Kind::report, .src = src});
   rig.settle_without_reading();
   EXPECT_EQ(rig.sum(&ShardCounters::reports_lost), 0u);
   far.pipe.reset();
@@ -98,8 +100,7 @@ TEST(LinkControl, PassesOnReportsOfTheSameHeaderThatComeTogether) {
   FakeNode& far = rig.link(0, kFar);
   const std::uint32_t src = make_id<NodeId>(kNear, kHubIndex).value();
   for (int i = 0; i < 3; ++i)
-    rig.send(near, make_id<NodeId>(kFar, 5).value(), "a report",
-             {.kind = Kind::report, .src = src});
+    rig.send(near, make_id<NodeId>(kFar, 5).value(), kReport, {.kind = Kind::report, .src = src});
   rig.settle();
   EXPECT_EQ(std::ranges::count(far.kinds, Kind::report), 3);
 }

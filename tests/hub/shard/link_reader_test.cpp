@@ -6,6 +6,7 @@
 #include "base/clock.hpp"
 #include "proto/frame/extensions.hpp"
 #include "proto/frame/frame_builder.hpp"
+#include "proto/frame/report.hpp"
 #include "tests/hub/shard/support/hub_rig.hpp"
 
 // Frames that come over links, and go over them.
@@ -186,7 +187,8 @@ TEST(LinkReader, AReportNeverGoesBack) {
   FakeNode& link = rig.link(0, kNear);
   FakeNode& far = rig.link(0, kFar);
   const auto report = [&](std::uint32_t to) {
-    rig.write(link, frame_after(3, to, "words", {.kind = Kind::report}));
+    const std::string payload(proto::kReportSizeMin, '\1');
+    rig.write(link, frame_after(3, to, payload, {.kind = Kind::report}));
     rig.settle();
   };
   const auto reports = [](const FakeNode& node) {

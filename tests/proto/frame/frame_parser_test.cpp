@@ -289,6 +289,21 @@ TEST(CheckHeader, KnowsWhichFlagsAKindMayCarry) {
   }
 }
 
+TEST(CheckHeader, NothingStandsBeforeThePayloadOfAReportOrFlowOfAHub) {
+  constexpr unsigned kForbidden = kFlagFragment | kFlagKeyed | kFlagExt;
+  for (const Kind kind : {Kind::report, Kind::flow}) {
+    for (unsigned flags = 0; flags < 0x100; ++flags) {
+      FrameHeader header = header_to(1, kind, static_cast<std::uint8_t>(flags));
+      header.hops = 5;
+      EXPECT_EQ(check_header_of_hub_word(header),
+                (flags & kForbidden) != 0 ? FrameError::flag_not_allowed : FrameError::none)
+          << flags;
+      header.lane = 4;
+      EXPECT_EQ(check_header_of_hub_word(header), FrameError::reserved_lane_bits);
+    }
+  }
+}
+
 TEST(CheckHeader, BoundsTheRecipientsOfAList) {
   EXPECT_EQ(check_header_from_node(header_to(0, Kind::list)), FrameError::list_count);
   EXPECT_EQ(check_header_from_node(header_to(1, Kind::list)), FrameError::none);

@@ -6,7 +6,8 @@ import threading
 import time
 
 from stranger_parts.bitestream import OPAQUE, TEXT, TIME, U16, U64, put
-from stranger_parts.client import Refused, Stranger
+from stranger_parts.client import FLOW, PING, PONG, Refused, Stranger
+from support.waiting import wait_until
 
 ROUTE, RECORD, RECORDS_END, KEEP_ALIVE = 19, 1, 2, 3
 OWN_HUB, INSTANCE = 9, 4711
@@ -22,6 +23,7 @@ class Liar:
         introduction = put(20, U16, OWN_HUB) + put(21, OPAQUE, self._unique) + put(22, U64, INSTANCE) + put(26, TEXT, "liar")
         self._link.join(role=1, extra=introduction)
         self._ended, self._lock = threading.Event(), threading.Lock()
+        self.closed, self._asked, self._answered = False, 0, set()  # numbers of PINGs
         self._peer = (self._link.welcome[20], self._link.welcome[21])
         self._sequence = 0
         for work in (self._read, self._keep_alive):
@@ -33,6 +35,20 @@ class Liar:
     def end(self):
         self._ended.set()
         self._link.close()
+
+    def send(self, frame):
+        """The bytes of any frame."""
+        with self._lock:
+            self._link.socket.sendall(frame)
+
+    def wait_until_taken(self):
+        """The hub has read all frames, and the link stands."""
+        self._asked += 1
+        sequence = 1_000_000 + self._asked
+        with self._lock:
+            self._link.flow(PING, struct.pack("<Iq", sequence, 0))
+        wait_until(lambda: sequence in self._answered or self.closed, "the PONG")
+        assert not self.closed, "the hub closed the link"
 
     def invent(self, hubs):
         """So many hubs behind this one, each with a record of its own; they can be reached, and answer nothing."""
@@ -77,6 +93,8 @@ class Liar:
     def _read(self):
         try:
             while True:
-                self._link.read()
+                got = self._link.read()
+                if got.kind == FLOW and got.body[0] == PONG:
+                    self._answered.add(struct.unpack_from("<I", got.body, 4)[0])
         except (OSError, Refused, ValueError):
-            pass
+            self.closed = True

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <memory>
 
+#include "proto/frame/report.hpp"
+
 namespace gimnet::hub {
 namespace {
 
@@ -62,7 +64,7 @@ Admission IngressGate::check(IngressState& state, const proto::FrameHeader& head
   if (!own && !(unnamed_allowed && header.src == 0)) return Admission::wrong_source;
   if (header.kind == proto::Kind::link) return Admission::link;
   if (static_cast<std::uint8_t>(header.kind) >= proto::kFirstControlKind)
-    return check_request(state, header, view);
+    return check_request(state, header, view, proto::Origin::node);
   if (header.kind == proto::Kind::flow) return Admission::flow;
   return check_parts(state, header, view, proto::Origin::node);
 }
@@ -92,15 +94,16 @@ Admission IngressGate::look_at_link(IngressState& state, std::byte* run, proto::
   if (header.kind == proto::Kind::link) return Admission::link;
   if (header.kind == proto::Kind::route) return Admission::control;
   const std::uint8_t hops = std::exchange(header.hops, 0);
-  if (header.kind == proto::Kind::flow) return Admission::flow;
+  const bool flow = header.kind == proto::Kind::flow;
   const bool report = header.kind == proto::Kind::report;
-  if (!report) {
-    const proto::FrameError error = proto::check_header_from_node(header);
-    if (error != proto::FrameError::none) return refuse(state, error);
-  }
+  const proto::FrameError error = flow || report ? proto::check_header_of_hub_word(header)
+                                                 : proto::check_header_from_node(header);
+  if (error != proto::FrameError::none) return refuse(state, error);
+  if (flow) return Admission::flow;
   if (!state.link->allows(hub_of(NodeId{header.src}))) return Admission::wrong_source;
-  if (report) return Admission::report;
-  if (static_cast<std::uint8_t>(header.kind) >= proto::kFirstControlKind) return Admission::control;
+  if (report) return check_report(state, view);
+  if (static_cast<std::uint8_t>(header.kind) >= proto::kFirstControlKind)
+    return check_request(state, header, view, proto::Origin::hub);
   if (const Admission parts = check_parts(state, header, view, proto::Origin::hub);
       parts != Admission::data)
     return parts;
@@ -112,10 +115,16 @@ Admission IngressGate::look_at_link(IngressState& state, std::byte* run, proto::
   return Admission::data;
 }
 
+/// A library takes a REPORT for its hub's own word: one that it cannot read must not reach it.
+Admission IngressGate::check_report(IngressState& state, const proto::RunView& view) {
+  const bool whole = view.size >= proto::kHeaderSize + proto::kReportSizeMin;
+  return whole ? Admission::report : refuse(state, proto::FrameError::report_too_short);
+}
+
 Admission IngressGate::check_request(IngressState& state, const proto::FrameHeader& header,
-                                     const proto::RunView& view) {
+                                     const proto::RunView& view, proto::Origin origin) {
   if (!header.has(proto::kFlagExt)) return Admission::control;
-  const auto frame = proto::parse_frame({view.bytes, view.size}, proto::Origin::node);
+  const auto frame = proto::parse_frame({view.bytes, view.size}, origin);
   return frame ? Admission::control : refuse(state, frame.error());
 }
 

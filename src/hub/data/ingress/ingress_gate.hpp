@@ -118,9 +118,10 @@ class IngressGate {
                                              proto::RunView& view, proto::Origin origin);
   [[nodiscard]] Admission check(IngressState& state, const proto::FrameHeader& header,
                                 proto::RunView& view);
+  [[nodiscard]] static Admission check_report(IngressState& state, const proto::RunView& view);
   [[nodiscard]] static Admission check_request(IngressState& state,
                                                const proto::FrameHeader& header,
-                                               const proto::RunView& view);
+                                               const proto::RunView& view, proto::Origin origin);
   /// Are the frames to be moved to lane 1?
   [[nodiscard]] bool spend_lane0(IngressState& state, std::uint64_t bytes, std::uint64_t now_ms);
   [[nodiscard]] bool moves_fragment(IngressState& state, const proto::RunView& view,
