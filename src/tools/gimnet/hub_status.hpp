@@ -33,8 +33,8 @@ struct Ledger {
   std::uint64_t delivered = 0;
   std::uint64_t dropped = 0;
   std::uint64_t queued = 0;
-  /// Of those dropped: copies of broadcasts and group frames by another way than the shortest one.
-  /// A network with several ways has them in its best health.
+  /// Of those dropped: copies of broadcasts by another way than the shortest one, by which nothing
+  /// is lost. A network with several ways has them in its best health.
   std::uint64_t wrong_way = 0;
   /// Holds exactly whenever nothing moves.
   [[nodiscard]] bool exact() const { return accepted + copies == delivered + dropped + queued; }

@@ -116,8 +116,8 @@ proto::DropReason Router::why_absent(NodeId node) const {
 
 /// A frame of a group of another hub comes over the link that this hub joined the group on, from a
 /// node of that hub. Whoever provides the group was looked at there: the names of a new provider
-/// may come later than its frames. A link's frame that is too late is nobody's loss: its sender is
-/// not told.
+/// may come later than its frames. The sender of a link's frame is told nothing: the message may
+/// come over the other link, and subscribers see by its number if it does not.
 const GroupMembers* Router::find_away_group(const Run& run, const proto::FrameHeader& header,
                                             Arrival arrival) {
   const GroupId group{header.dst};
@@ -126,11 +126,13 @@ const GroupMembers* Router::find_away_group(const Run& run, const proto::FrameHe
     drop(run, members == nullptr ? proto::DropReason::no_route : proto::DropReason::not_allowed);
     return nullptr;
   }
-  const bool right_way = arrival.handed_over() || members == nullptr || members->parent == from_;
-  if (members != nullptr && right_way && hub_of(NodeId{header.src}) == hub_of(group))
-    return members;
-  const auto reason =
-      members == nullptr ? proto::DropReason::no_subscriber : proto::DropReason::wrong_way;
+  auto reason = proto::DropReason::no_subscriber;
+  if (members != nullptr) {
+    const bool from_parent = arrival.handed_over() || members->parent == from_;
+    const bool from_owner = hub_of(NodeId{header.src}) == hub_of(group);
+    if (from_parent && from_owner) return members;
+    reason = from_parent ? proto::DropReason::not_allowed : proto::DropReason::no_route;
+  }
   fanout_.context().tally.drop(reason, run.frames);
   return nullptr;
 }
