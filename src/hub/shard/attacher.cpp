@@ -150,8 +150,14 @@ bool Attacher::go_on(Connection& connection, const AttachCommand& command, Run& 
 
 void Attacher::begin_anew(Connection& connection, const AttachCommand& command,
                           const Run& partial) {
+  // One that an administrator gave another id begins anew, too.
+  const bool same_program = command.resume_wanted && connection.resume != nullptr &&
+                            command.peer_epoch == connection.resume->peer_epoch;
   closer_.lose_unconfirmed(connection, partial);
   connection.outbox.drop_replay(proto::DropReason::link_lost, state_.egress);
+  // A command for the program before would be carried out late, by a program that never heard of
+  // it. What waits for a link is for the nodes behind it.
+  if (!same_program && !connection.is_link()) connection.outbox.drop_addressed(state_.egress);
   connection.outbox.set_resume(nullptr);
   connection.resume.reset();
   count_anew(connection);

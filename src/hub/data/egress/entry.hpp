@@ -42,6 +42,11 @@ struct Entry {
   }
   /// Messages of which the end is in it.
   [[nodiscard]] std::uint32_t messages() const { return fragmented ? (complete ? 1 : 0) : frames; }
+  /// It goes to one node, by its id or as the one that accepts a service.
+  [[nodiscard]] bool is_addressed() const {
+    const proto::Kind kind = run.header().kind;
+    return kind == proto::Kind::unicast || kind == proto::Kind::service;
+  }
   void append(Run piece, PiecePool& pool) {
     size += piece.size;
     frames += piece.frames;

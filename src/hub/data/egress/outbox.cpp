@@ -186,16 +186,6 @@ void Outbox::on_link_took(std::uint64_t bytes, bool emptied) {
   if (!emptied || (link_lane_bytes_ != 0 && limit > link_lane_bytes_)) link_lane_bytes_ = limit;
 }
 
-void Outbox::time_out_block(EgressContext& context) {
-  close_run();
-  if (!lanes_) return;
-  for (LaneQueue& lane : lanes_->queues) {
-    lane.lose_all([](const Entry& entry) { return entry.block && !entry.touched; },
-                  [&](Entry& entry) { lose(entry, proto::DropReason::timed_out, context); });
-  }
-  signal_room(context);
-}
-
 void Outbox::drop_all(proto::DropReason reason, EgressContext& context) {
   clear_control();
   if (lanes_) {

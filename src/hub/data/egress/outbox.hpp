@@ -201,7 +201,16 @@ class Outbox {
   }
 
   /// The recipient took nothing for too long: every message sent with BLOCK goes.
-  void time_out_block(EgressContext& context);
+  void time_out_block(EgressContext& context) {
+    drop_if([](const Entry& entry) { return entry.block && !entry.touched; },
+            proto::DropReason::timed_out, context);
+  }
+  /// Another program has the connection now: what was sent to the former one alone goes, messages
+  /// that were begun included. REQUIRES: nothing was written to the connection yet.
+  void drop_addressed(EgressContext& context) {
+    drop_if([](const Entry& entry) { return entry.is_addressed(); }, proto::DropReason::away,
+            context);
+  }
   /// The session is over, or its connection and nothing may wait: all lanes go.
   void drop_all(proto::DropReason reason, EgressContext& context);
   /// The connection is gone: control frames that wait mean nothing to the next one.
@@ -261,6 +270,15 @@ class Outbox {
     return entry.size <= room(lane, entry.block, limits);
   }
 
+  /// The messages for which which(const Entry&) is true go. Paused senders go on if there is room.
+  template <class Which>
+  void drop_if(const Which& which, proto::DropReason reason, EgressContext& context) {
+    close_run();
+    if (!lanes_) return;
+    for (LaneQueue& lane : lanes_->queues)
+      lane.lose_all(which, [&](Entry& entry) { lose(entry, reason, context); });
+    signal_room(context);
+  }
   void note_waiting(EgressContext& context);
   /// While memory is scarce frames are taken in pieces that fit in a chunk: a longer one would stay
   /// for the sake of its last frame.
