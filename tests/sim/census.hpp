@@ -61,6 +61,7 @@ enum class Happening : std::uint8_t {
   service_moved,
   provider_changed,
   service_withdrawn,
+  service_away,
   subscribed_before_service,
   undeclared_dropped,
   name_registered,

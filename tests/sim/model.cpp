@@ -191,6 +191,7 @@ void Model::take_session(const Hello& hello, const Verdict& verdict, std::uint32
   census_.add(session.connected ? Happening::came_back_replacing : Happening::came_back);
   if (!former(index).empty()) census_.add(Happening::renumbered_came_back);
   ++session.life;
+  begin_away(session);  // the former connection may not have ended before
   session.declares = true;
   session.declare_until = now + milliseconds{limits_.grace_ms};
   session.declare_order = ++orders_;
@@ -246,6 +247,7 @@ void Model::detached(const hub::DetachedEvent& event, milliseconds now) {
     session.last_goodbye = static_cast<std::uint16_t>(event.code);
   }
   session.connected = false;
+  begin_away(session);
   session.watches.clear();
   session.away_until = now + milliseconds{limits_.grace_ms};
   session.away_order = ++orders_;

@@ -117,6 +117,8 @@ class Model final : public Witness {
     std::uint32_t provider = 0;
     proto::ns::Advertise terms;
     std::uint64_t stream = 0;  ///< of all, never given twice; 0: nobody provides it
+    /// It accepts, and its node has not advertised it on its present connection.
+    bool away = false;
     [[nodiscard]] bool provided() const { return provider != 0; }
   };
   /// The most that a subscriber wants of a service; 0: without a bound.
@@ -264,6 +266,8 @@ class Model final : public Witness {
   void give_back_unused(milliseconds now);
   void leave_group(const std::string& full_name, milliseconds now);
   void withdraw(const std::string& full_name, milliseconds now);
+  /// Its connection is gone: what it accepts is away.
+  void begin_away(const Session& session);
   void unsubscribe(std::uint32_t index, const std::string& full_name, milliseconds now);
 
   // Requests; each checks the answer

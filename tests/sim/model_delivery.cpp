@@ -122,6 +122,7 @@ ns::ServiceState Model::state_of(const Topic& topic, std::uint32_t subscriber) c
   state.delivery = terms.delivery;
   state.retain = terms.retain;
   state.direction = terms.direction;
+  state.away = topic.service->away;
   if (const auto pace = pace_of(topic, subscriber)) state.window = pace->window;
   return state;
 }

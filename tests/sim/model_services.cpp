@@ -80,10 +80,21 @@ void Model::withdraw(const std::string& full_name, milliseconds now) {
   sessions_.at(entry.service->provider).provides.erase(full_name);
   entry.service->provider = 0;
   entry.service->stream = 0;
+  entry.service->away = false;
   touched_.insert(entry.service->group);
   if (!entry.subscribers.empty()) census_.add(Happening::service_withdrawn);
   moved_services_.insert(full_name);
   note_if_unused(full_name, now);
+}
+
+void Model::begin_away(const Session& session) {
+  for (const auto& [full_name, life] : session.provides) {
+    Service& service = *topics_.at(full_name).service;
+    if (service.terms.direction != ns::Direction::accepts || std::exchange(service.away, true))
+      continue;
+    if (!topics_.at(full_name).subscribers.empty()) census_.add(Happening::service_away);
+    moved_services_.insert(full_name);
+  }
 }
 
 void Model::unsubscribe(std::uint32_t index, const std::string& full_name, milliseconds now) {
@@ -148,6 +159,7 @@ void Model::judge_advertise(const Asked& asked) {
   Topic& topic = topics_.at(full_name);
   if (known == nullptr) take_over(asked, full_name, topic);
   topic.service->terms = *offer;
+  if (std::exchange(topic.service->away, false)) moved_services_.insert(full_name);
 }
 
 void Model::take_over(const Asked& asked, const std::string& full_name, Topic& topic) {

@@ -131,6 +131,10 @@ void EffectRunner::run(const AwayGroupChanged& effect) {
   if (parts_.groups != nullptr) parts_.groups->note_away(effect.group);
 }
 
+void EffectRunner::run(const AcceptanceChanged& effect) {
+  if (parts_.names != nullptr) parts_.names->note(effect);
+}
+
 void EffectRunner::run(const MemberChanged& effect) {
   parts_.publisher.publish_members(effect.group, {&effect.subscriber, 1}, parts_.membership);
 }

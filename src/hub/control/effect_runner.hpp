@@ -64,6 +64,7 @@ class EffectRunner {
   void run(const NodeChanged& effect);
   void run(const GroupChanged& effect);
   void run(const AwayGroupChanged& effect);
+  void run(const AcceptanceChanged& effect);
   void run(const MemberChanged& effect);
   void run(const SessionEnded& effect);
   void run(const RenumberDue& effect);

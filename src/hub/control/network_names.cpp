@@ -31,6 +31,15 @@ std::string reason(const route::NameClaim& own, const route::NameClaim& winner) 
          std::to_string(own.rank);
 }
 
+/// Only whether a service that accepts is away is different.
+bool is_acceptance_alone(const NameChange& change) {
+  if (!change.before || !change.after || !change.after->service) return false;
+  route::NameClaim before = *change.before;
+  before.version = change.after->version;
+  before.state = change.after->state;
+  return before == *change.after;
+}
+
 }  // namespace
 
 void NetworkNames::begin_connection(LinkNumber number, milliseconds now) {
@@ -63,6 +72,7 @@ void NetworkNames::put(const Topic& topic) {
   const Session* provider = parts_.membership.sessions().find(topic.service->provider);
   route::NameClaim claim;
   claim.node = make_id(parts_.facts.id, topic.service->provider);
+  if (topic.service->provider_away) claim.state = route::NameState::away;
   claim.service.emplace();
   claim.service->group = make_id(parts_.facts.id, topic.service->group);
   claim.service->session = provider == nullptr ? 0 : provider->number;
@@ -93,6 +103,11 @@ void NetworkNames::note(const ServiceNoted& noted) {
   } else if (const Topic* topic = parts_.membership.topics().find_group(noted.group)) {
     put(*topic);
   }
+}
+
+void NetworkNames::note(const AcceptanceChanged& noted) {
+  const Topic* topic = exchange_ ? parts_.membership.topics().find_group(noted.group) : nullptr;
+  if (topic != nullptr) put(*topic);
 }
 
 void NetworkNames::take(LinkNumber number, std::span<const std::byte> payload, milliseconds now) {
@@ -131,7 +146,7 @@ void NetworkNames::settle(milliseconds now, Effects& effects, const NextHops* ho
     const bool service =
         (change.before && change.before->service) || (change.after && change.after->service);
     if (service) note_service(change, now, effects);
-    parts_.watches.note(change);
+    if (!is_acceptance_alone(change)) parts_.watches.note(change);
   }
   if (std::exchange(dropped_copies_, exchange_->copies().dropped_copies()) !=
       exchange_->copies().dropped_copies()) {

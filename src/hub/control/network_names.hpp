@@ -48,6 +48,7 @@ class NetworkNames {
   /// This hub's own names change. REQUIRES: the effects before it were noted.
   void note(const NodeNoted& noted);
   void note(const ServiceNoted& noted);
+  void note(const AcceptanceChanged& noted);
   /// Lets go of names that were lost, and tells own nodes what changed elsewhere. `hops`: for the
   /// log; or null.
   void settle(std::chrono::milliseconds now, Effects& effects, const NextHops* hops = nullptr);

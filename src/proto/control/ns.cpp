@@ -314,6 +314,7 @@ void ServiceState::write_state(bitestream::Writer& writer) const {
   if (window != 0) writer.put_u32(10, window);
   if (retain) writer.put_bool(11, retain);
   if (direction != Direction::provides) put_choice(writer, 12, direction);
+  if (away) writer.put_bool(13, away);
 }
 void ServiceState::read_state(Fields& fields) {
   group = read_id<GroupId>(fields, 4, "group id");
@@ -325,6 +326,7 @@ void ServiceState::read_state(Fields& fields) {
   window = fields.number<std::uint32_t>(10, "window", 0);
   retain = fields.flag(11, "retain", false);
   direction = read_choice<Direction>(fields, 12, "direction");
+  away = fields.flag(13, "away", false);
 }
 
 void SubscribeAnswer::write(bitestream::Writer& writer) const {

@@ -269,6 +269,8 @@ struct ServiceState {
   bool retain = false;
   Direction direction =
       Direction::provides;  ///< as sent; accepts: nothing will come, but it can be sent to
+  /// It accepts, and its node has lost its connection and not advertised it again since.
+  bool away = false;
   void write_state(bitestream::Writer& writer) const;
   void read_state(Fields& fields);
   friend bool operator==(const ServiceState&, const ServiceState&) = default;

@@ -64,6 +64,8 @@ class Side {
       } else if (const auto* service = std::get_if<ServiceNoted>(&effect)) {
         watches.note(*service, membership, now);
         names.note(*service);
+      } else if (const auto* accepting = std::get_if<AcceptanceChanged>(&effect)) {
+        names.note(*accepting);
       } else if (const auto* lost = std::get_if<NameLossDue>(&effect)) {
         lost_names.push_back(lost->name);
       } else if (const auto* moved = std::get_if<ServiceChanged>(&effect)) {
@@ -81,6 +83,12 @@ class Side {
     const auto answer = handle(context, {session, {Asked::kOperation, 1}, payload, own_only});
     carry_out(effects);
     return proto::decode_answer<Answer>(answer);
+  }
+  /// It loses its connection; its node is waited for.
+  void lose(Session& session) {
+    Effects effects;
+    membership.connection_ended(session, {}, now, effects);
+    carry_out(effects);
   }
   std::vector<std::string> watched() {
     std::vector<std::string> told;
@@ -203,9 +211,7 @@ TEST_F(NetworkNamesTest, ANodeThatIsAwayOrUnreachableIsSaidToBe) {
   const Session& asker = here_.join("asker");
   Session& robot = there_.join("robot");
   connect();
-  Effects effects;
-  there_.membership.connection_ended(robot, {}, there_.now, effects);
-  there_.carry_out(effects);
+  there_.lose(robot);
   settle();
   const auto standing = [&] {
     return here_.ask<ns::ResolveAnswer>(handle_resolve, asker, ns::Resolve{"robot"})->standing;
@@ -213,6 +219,34 @@ TEST_F(NetworkNamesTest, ANodeThatIsAwayOrUnreachableIsSaidToBe) {
   EXPECT_EQ(standing(), ns::NameStanding::away);
   here_.names.set_reachable(NetworkMap(HubIdentity{}), RecordStore{}, here_.now);
   EXPECT_EQ(standing(), ns::NameStanding::unreachable);
+}
+
+// Those who send there are told, and those who watch are not.
+TEST_F(NetworkNamesTest, AServiceThatAcceptsIsAwayAtAllHubs) {
+  const Session& sender = here_.join("sender");
+  Session& robot = there_.join("robot");
+  ServiceTerms commands;
+  commands.direction = ns::Direction::accepts;
+  there_.advertise(robot, "robot/drive", commands);
+  connect();
+  const auto is_away = [&] {
+    return here_.ask<ns::SubscribeAnswer>(handle_subscribe, sender, ns::Subscribe{"robot/drive"})
+        ->away;
+  };
+  EXPECT_FALSE(is_away());
+  ASSERT_TRUE(here_.watches.watch(sender.index, watch_of_all()));
+  static_cast<void>(here_.watched());
+  here_.moved_services.clear();
+  there_.lose(robot);
+  settle();
+  EXPECT_EQ(here_.moved_services, std::vector<std::string>{"robot/drive"});
+  EXPECT_TRUE(is_away());
+  there_.advertise(robot, "robot/drive", commands);
+  settle();
+  EXPECT_EQ(here_.moved_services, (std::vector<std::string>{"robot/drive", "robot/drive"}));
+  EXPECT_FALSE(is_away());
+  const auto away = std::to_string(static_cast<int>(ns::ChangeKind::away)) + " robot";
+  EXPECT_EQ(here_.watched(), std::vector<std::string>{away});
 }
 
 TEST_F(NetworkNamesTest, ListsGoThroughAllHubsInPages) {

@@ -104,6 +104,8 @@ TEST(NsMessages, EventsAreAsTheVectorsSay) {
   accepting.group = GroupId{0x00700006};
   accepting.direction = Direction::accepts;
   expect_request("ns/service_moved_accepting", 0, accepting);
+  accepting.away = true;
+  expect_request("ns/service_moved_away", 0, accepting);
   expect_request("ns/subscribers", 0, Subscribers{kGroup, 2});
 }
 

@@ -35,14 +35,15 @@ enum class Event : std::uint8_t {
   paused_sender,
   asked_another_hub,
   counted_on,
+  service_away,
 };
-inline constexpr std::array<std::string_view, 26> kEventNames = {
+inline constexpr std::array<std::string_view, 27> kEventNames = {
     "stalled",      "reset",        "cut",        "one_way",       "partition",
     "killed",       "lost_power",   "lost_state", "drained",       "stopped",
     "clock_jump",   "link_removed", "link_added", "other_cost",    "node_crashed",
     "moved",        "resumed",      "unsure",     "no_route",      "id_collision",
     "copied_state", "refused_name", "lost_name",  "paused_sender", "asked_another_hub",
-    "counted_on"};
+    "counted_on",   "service_away"};
 
 /// Counts of each. Thread safety: none.
 class Census {

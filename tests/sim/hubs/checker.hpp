@@ -24,13 +24,14 @@ enum class Checker : std::uint8_t {
   one_owner,     ///< of connected hubs one has a name, and all say so
   parents,       ///< a group of another hub comes from the next hop towards that hub
   subscribers,   ///< a new subscriber at any hub gets the last message, and those that follow
+  acceptors,     ///< all hubs tell whether a service that accepts is away
   resumes,       ///< nobody stays paused or held
   ledgers,       ///< each hub's ledger is exact, and those of both ends of a link agree
 };
-inline constexpr std::array<std::string_view, 16> kCheckerNames = {
-    "never_back", "hops",         "one_link", "right_node", "bounded", "answered",
-    "joined",     "equal_tables", "no_loop",  "reachable",  "moves",   "one_owner",
-    "parents",    "subscribers",  "resumes",  "ledgers"};
+inline constexpr std::array<std::string_view, 17> kCheckerNames = {
+    "never_back", "hops",         "one_link",  "right_node", "bounded", "answered",
+    "joined",     "equal_tables", "no_loop",   "reachable",  "moves",   "one_owner",
+    "parents",    "subscribers",  "acceptors", "resumes",    "ledgers"};
 
 /// Thrown by a checker: the world is broken and stops.
 struct Broken {

@@ -35,6 +35,7 @@ void Settled::check() {
   for (std::size_t hub = 0; hub < world_.machines_.size(); ++hub) check_ways(hub);
   check_moves();
   check_groups();
+  check_acceptors();
   ask_names();
   send_to_all();
   check_names();

@@ -61,6 +61,8 @@ void SimNode::join(SimHub& hub, milliseconds now) {
   paused_.clear();
   asked_.clear();
   given_.reset();
+  accepts_ = false;
+  followed_.clear();
   hub::Stranger stranger;
   stranger.transport = std::move(stream);
   stranger.peer = {"unix", plan_.name};
@@ -219,6 +221,10 @@ void SimNode::take_control(std::span<const std::byte> payload) {
   const auto view = proto::split_control(payload);
   if (!view) return;
   if (!view->header.is_answer()) {
+    if (const auto moved = proto::decode<ns::ServiceMoved>(payload)) {
+      if (followed_.contains(moved->name)) followed_[moved->name] = *moved;
+      return;
+    }
     const auto lost = proto::decode<ns::NameLost>(payload);
     if (!lost) return;
     around_.census.note(Event::lost_name);
@@ -230,10 +236,15 @@ void SimNode::take_control(std::span<const std::byte> payload) {
     broken(Checker::answered, "node " + plan_.name + " gets an answer that it did not ask for");
   const std::string name = found->second.name;
   const bool gives = found->second.gives;
+  if (const std::string follows = found->second.follows; !follows.empty()) {
+    if (const auto state = proto::decode_answer<ns::SubscribeAnswer>(payload))
+      followed_[follows] = *state;
+  }
   asked_.erase(found);
   if (const auto offered = proto::decode_answer<ns::AdvertiseAnswer>(payload)) {
     if (gives) return void(given_ = offered->group);
     group_ = offered->group;
+    accepts_ = true;
     return around_.book.note_group(offered->group, session_);
   }
   if (const auto listed = proto::decode_answer<ns::ServicesAnswer>(payload)) {
@@ -281,7 +292,7 @@ void SimNode::ask_something() {
 void SimNode::offer() {
   if (name_.empty()) return;
   ns::Advertise advertise;
-  advertise.service = "takes";
+  advertise.service = kTaken;
   advertise.direction = ns::Direction::accepts;
   ++last_request_;
   ask(Kind::ns, proto::encode(advertise, last_request_), last_request_, {});
@@ -320,6 +331,13 @@ void SimNode::list_service(const std::string& node) {
   request.pattern = node + "/" + kGiven;
   ++last_request_;
   ask(Kind::ns, proto::encode(request, last_request_), last_request_, {});
+}
+
+void SimNode::follow(const std::string& node) {
+  const std::string full_name = node + "/" + kTaken;
+  ++last_request_;
+  ask(Kind::ns, proto::encode(ns::Subscribe{full_name}, last_request_), last_request_, {});
+  asked_[last_request_].follows = full_name;
 }
 
 void SimNode::resolve(const std::string& name, HubId hub) {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "proto/control/control_message.hpp"
+#include "proto/control/ns.hpp"
 #include "proto/frame/flow.hpp"
 #include "tests/sim/hubs/book.hpp"
 #include "tests/sim/hubs/census.hpp"
@@ -82,6 +83,15 @@ class SimNode {
   /// It missed so many messages of that group in total.
   void say_missed(GroupId group, std::uint64_t total);
   void list_service(const std::string& node);
+  /// To the service that a node of that name accepts: where it is, and whether it is away.
+  void follow(const std::string& node);
+  /// As its hub told last; null: it has not yet.
+  [[nodiscard]] const proto::ns::ServiceState* followed(const std::string& node) const {
+    const auto found = followed_.find(node + "/" + kTaken);
+    return found == followed_.end() ? nullptr : &found->second;
+  }
+  /// It accepts a service, and has advertised it on this connection.
+  [[nodiscard]] bool accepts() const { return accepts_; }
   /// The answers to list_service(): messages that subscribers at its hub missed, and the one that
   /// missed most.
   [[nodiscard]] std::pair<std::uint64_t, NodeId> missed(GroupId group) { return missed_[group]; }
@@ -96,10 +106,12 @@ class SimNode {
   [[nodiscard]] std::map<std::string, NodeId>& resolved() { return resolved_; }
 
  private:
+  static constexpr const char* kTaken = "takes";
   struct Asked {
     milliseconds at;
-    std::string name;    ///< that was to be resolved
-    bool gives = false;  ///< ADVERTISE of a service with last message
+    std::string name;       ///< that was to be resolved
+    bool gives = false;     ///< ADVERTISE of a service with last message
+    std::string follows{};  ///< SUBSCRIBE of that full name
   };
   void join(SimHub& hub, milliseconds now);
   void begin_session(NodeId id, bool new_session);
@@ -133,8 +145,10 @@ class SimNode {
   std::uint64_t session_ = 0;
   std::string name_;
   std::vector<std::byte> token_;
-  std::optional<GroupId> group_;  ///< of its service, which takes data
-  bool gives_ = false;            ///< it has a service with last message, each time that it joins
+  std::optional<GroupId> group_;                             ///< of its service, which takes data
+  bool accepts_ = false;                                     ///< since it joined
+  std::map<std::string, proto::ns::ServiceState> followed_;  ///< by full name
+  bool gives_ = false;  ///< it has a service with last message, each time that it joins
   std::optional<GroupId> given_;
   std::uint64_t published_ = 0;
   std::uint64_t taken_ = 0;

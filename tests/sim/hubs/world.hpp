@@ -133,7 +133,8 @@ class World {
   bool faults_ = true;                     ///< they may come, and nodes speak by themselves
 };
 
-/// Looks at a world that was left alone: settled.cpp, moves.cpp, groups.cpp, arrivals.cpp.
+/// Looks at a world that was left alone: settled.cpp, moves.cpp, groups.cpp, acceptors.cpp,
+/// arrivals.cpp.
 class Settled {
  public:
   explicit Settled(World& world);
@@ -165,6 +166,8 @@ class Settled {
   /// May that operator subscribe to it?
   [[nodiscard]] bool is_near(const SimNode& person, const Given& each) const;
   void check_missed(const std::vector<Given>& all);
+  void check_acceptors();
+  void compare_acceptors(const char* when);
   void ask_names();
   void check_names();
   void send_to_all();

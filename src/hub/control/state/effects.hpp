@@ -112,10 +112,16 @@ struct ServiceNoted {
   std::string full_name;
 };
 
+/// A service that accepts has lost its provider's connection, or is there again: other hubs are to
+/// know. Those who watch are not told.
+struct AcceptanceChanged {
+  GroupIndex group;
+};
+
 using Effect =
     std::variant<NodeChanged, GroupChanged, AwayGroupChanged, MemberChanged, SessionEnded,
                  ServiceChanged, PaceDue, PaceEnded, RetainedDropped, SubscribersChanged, CloseDue,
-                 RenumberDue, StateDue, NameLossDue, NodeNoted, ServiceNoted>;
+                 RenumberDue, StateDue, NameLossDue, NodeNoted, ServiceNoted, AcceptanceChanged>;
 using Effects = std::vector<Effect>;
 
 }  // namespace gimnet::hub

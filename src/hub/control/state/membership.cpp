@@ -79,7 +79,7 @@ Result<Membership::Joined, proto::Goodbye> Membership::session_for(const JoinReq
                                                                    milliseconds now,
                                                                    Effects& effects) {
   if (claim.session != nullptr) {
-    services_.node_returned(claim.session->index);
+    services_.node_returned(claim.session->index, effects);
     claim.session->came_back = true;
     return Joined{claim.session, false};
   }
@@ -107,6 +107,7 @@ void Membership::connection_ended(Session& session, const Ending& ending, millis
   }
   sessions_.begin_grace(
       session, now, services_.declares(session.index) ? Declared::something : Declared::nothing);
+  services_.node_away(session.index, effects);
   effects.emplace_back(NodeNoted{ChangeKind::away, session.index, {}, {}});
 }
 

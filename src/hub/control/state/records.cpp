@@ -40,6 +40,7 @@ void put_state(ns::ServiceState& state, const HubTitle& hub, const Topic& topic,
   state.delivery = service.terms.delivery;
   state.retain = service.terms.retain;
   state.direction = service.terms.direction;
+  state.away = service.provider_away;
 }
 
 ns::ServiceRecord record_of(const HubTitle& hub, const Topic& topic) {
@@ -96,6 +97,7 @@ void put_state(ns::ServiceState& state, const KnownName& known) {
   state.delivery = service.delivery;
   state.retain = service.retain;
   state.direction = service.direction;
+  state.away = known.claim->state == proto::route::NameState::away;
 }
 
 ns::Change change_of(ns::ChangeKind kind, const KnownName& known) {

@@ -128,7 +128,15 @@ std::vector<Services::Declared> Services::take_undeclared(std::vector<Declared>&
   return taken;
 }
 
-void Services::node_returned(NodeIndex node) {
+void Services::node_away(NodeIndex node, Effects& effects) {
+  const auto found = nodes_.find(node);
+  if (found == nodes_.end()) return;
+  for (const Declared& declared : found->second.provides)
+    topics_.set_provider_away(*declared.topic, true, effects);
+}
+
+void Services::node_returned(NodeIndex node, Effects& effects) {
+  node_away(node, effects);
   if (const auto found = nodes_.find(node); found != nodes_.end()) ++found->second.life;
 }
 
@@ -165,7 +173,7 @@ void Services::node_renumbered(NodeIndex node_index, NodeIndex new_index, Effect
 }
 
 void Services::node_left(NodeIndex node_index, milliseconds now, Effects& effects) {
-  node_returned(node_index);
+  if (const auto found = nodes_.find(node_index); found != nodes_.end()) ++found->second.life;
   drop_undeclared(node_index, now, effects);
 }
 

@@ -48,8 +48,11 @@ class Services {
                                                           std::chrono::milliseconds now,
                                                           Effects& effects);
 
-  /// The node came back on a new connection: it will declare again what it still wants.
-  void node_returned(NodeIndex node);
+  /// The node lost its connection: what it accepts is away until it advertises that again.
+  void node_away(NodeIndex node, Effects& effects);
+  /// The node came back on a new connection: it will declare again what it still wants. Its former
+  /// connection may not have ended before.
+  void node_returned(NodeIndex node, Effects& effects);
   /// Forgets what the node has not declared since node_returned().
   void drop_undeclared(NodeIndex node_index, std::chrono::milliseconds now, Effects& effects);
   /// Withdraws what the node provides: it has another name now.

@@ -59,7 +59,18 @@ Result<Topic*, proto::Refusal> Topics::provide(std::string_view full_name, NodeI
     entry.service->terms.metadata = terms.metadata;
     effects.emplace_back(service_noted(ChangeKind::changed, entry));
   }
+  set_provider_away(entry, false, effects);
   return &entry;
+}
+
+/// A service that gives data needs none of it: nobody sends there.
+void Topics::set_provider_away(Topic& topic, bool away, Effects& effects) {
+  LocalService& service = *topic.service;
+  if (service.terms.direction != proto::ns::Direction::accepts || service.provider_away == away)
+    return;
+  service.provider_away = away;
+  tell_subscribers(topic, effects);
+  effects.emplace_back(AcceptanceChanged{service.group});
 }
 
 void Topics::renumber_provider(Topic& topic, NodeIndex provider, Effects& effects) {
@@ -222,6 +233,7 @@ void Topics::take_over(Topic& topic, NodeIndex provider, const ServiceTerms& ter
 void Topics::end_provision(Topic& topic, milliseconds now, Effects& effects) {
   const ServiceNoted noted = service_noted(ChangeKind::withdrawn, topic);
   topic.service->provider = kNobody;
+  topic.service->provider_away = false;
   topic.orphan = ++orphaned_;
   orphans_[topic.orphan] = &topic;
   effects.emplace_back(GroupChanged{noted.group});

@@ -37,6 +37,8 @@ struct LocalService {
   GroupIndex group;
   NodeIndex provider;  ///< kNobody: nobody at the moment
   ServiceTerms terms;  ///< the latest provider's
+  /// It accepts, and its provider has lost its connection and not advertised it again since.
+  bool provider_away = false;
 };
 inline constexpr NodeIndex kNobody{};
 
@@ -110,6 +112,9 @@ class Topics {
                                                        Effects& effects);
   /// REQUIRES: somebody provides it.
   void end_provision(Topic& topic, std::chrono::milliseconds now, Effects& effects);
+  /// The provider of a service that accepts is away, or is there: its subscribers and the other
+  /// hubs are told if that is new. REQUIRES: somebody provides it.
+  void set_provider_away(Topic& topic, bool away, Effects& effects);
   /// The provider goes on under that index.
   void renumber_provider(Topic& topic, NodeIndex provider, Effects& effects);
 

@@ -132,6 +132,27 @@ TEST_F(MembershipTest, ANewcomerTakesThePlaceToo) {
   EXPECT_TRUE(membership.join(request("robot"), 2s, effects_));
 }
 
+TEST_F(MembershipTest, WhatANodeAcceptsIsAwayWhileItsNodeIs) {
+  Session* robot = join("robot");
+  ServiceTerms commands;
+  commands.direction = proto::ns::Direction::accepts;
+  const auto advertise = [&] {
+    ASSERT_TRUE(membership_.services().advertise(robot->index, "robot/d", commands, 1s, effects_));
+  };
+  advertise();
+  const LocalService& service = *membership_.topics().find("robot/d")->service;
+  lose(*robot, 1s);
+  EXPECT_TRUE(service.provider_away);
+  JoinRequest again = request("robot");
+  const std::vector<std::byte> token = token_of(*robot);
+  again.token = token;
+  ASSERT_TRUE(membership_.join(again, 2s, effects_));
+  EXPECT_TRUE(service.provider_away);
+  advertise();
+  EXPECT_FALSE(service.provider_away);
+  EXPECT_EQ(count<AcceptanceChanged>(), 2u);
+}
+
 TEST_F(MembershipTest, GoodbyeFreesNameAndIdAtOnce) {
   Session* robot = join("robot");
   membership_.connection_ended(*robot, {true, GoodbyeCode::done, ""}, 1s, effects_);

@@ -11,6 +11,7 @@ namespace {
 
 using proto::Status;
 using std::chrono::milliseconds;
+using test::commands;
 using test::kLogger;
 using test::kRobot;
 using test::kViewer;
@@ -153,7 +154,7 @@ TEST_F(ServicesTest, AReturnedNodeKeepsWhatItDeclaresAgain) {
   subscribe(kRobot, "x/a");
   subscribe(kRobot, "x/b");
   take_words();
-  services_.node_returned(kRobot);
+  services_.node_returned(kRobot, effects_);
   EXPECT_EQ(advertise(kRobot, "robot/odom"), GroupIndex{1});
   EXPECT_EQ(subscribe(kRobot, "x/b"), Status::done);
   EXPECT_THAT(take_words(), IsEmpty());
@@ -162,6 +163,51 @@ TEST_F(ServicesTest, AReturnedNodeKeepsWhatItDeclaresAgain) {
   EXPECT_TRUE(topics_.find_group(GroupIndex{1})->provided());
   EXPECT_EQ(services_.services_of(kRobot), 1u);
   EXPECT_EQ(topics_.by_name().size(), 3u);
+}
+
+TEST_F(ServicesTest, WhatANodeAcceptsIsAwayUntilItIsAdvertisedAgain) {
+  advertise(kRobot, "robot/drive", commands());
+  advertise(kRobot, "robot/odom");
+  subscribe(kViewer, "robot/drive");
+  subscribe(kViewer, "robot/odom");
+  take_words();
+  services_.node_away(kRobot, effects_);
+  EXPECT_THAT(take_words(), ElementsAre("moved robot/drive", "away 1"));
+  services_.node_returned(kRobot, effects_);
+  EXPECT_THAT(take_words(), IsEmpty()) << "it has not accepted it yet";
+  EXPECT_EQ(advertise(kRobot, "robot/odom"), GroupIndex{2});
+  EXPECT_TRUE(topics_.find_group(GroupIndex{1})->service->provider_away);
+  take_words();
+  EXPECT_EQ(advertise(kRobot, "robot/drive", commands()), GroupIndex{1});
+  EXPECT_THAT(take_words(), ElementsAre("moved robot/drive", "there 1"));
+}
+
+// The hub may hear of the new connection first.
+TEST_F(ServicesTest, WhatANodeAcceptsIsAwayWhenANewConnectionReplacesItsOwn) {
+  advertise(kRobot, "robot/drive", commands());
+  take_words();
+  services_.node_returned(kRobot, effects_);
+  EXPECT_THAT(take_words(), ElementsAre("away 1"));
+}
+
+TEST_F(ServicesTest, NobodyIsAwayWhoAcceptsNothingAnyMore) {
+  advertise(kRobot, "robot/drive", commands());
+  services_.node_away(kRobot, effects_);
+  services_.node_returned(kRobot, effects_);
+  services_.drop_undeclared(kRobot, now_, effects_);
+  EXPECT_FALSE(topics_.find_group(GroupIndex{1})->service->provider_away);
+  advertise(kLogger, "robot/drive", commands());
+  EXPECT_FALSE(topics_.find_group(GroupIndex{1})->service->provider_away);
+}
+
+TEST_F(ServicesTest, OneThatIsAcceptedOnOtherTermsIsThere) {
+  advertise(kRobot, "robot/drive", commands());
+  services_.node_away(kRobot, effects_);
+  services_.node_returned(kRobot, effects_);
+  ServiceTerms other = commands();
+  other.instance = 5;
+  EXPECT_EQ(advertise(kRobot, "robot/drive", other), GroupIndex{2});
+  EXPECT_FALSE(topics_.find_group(GroupIndex{2})->service->provider_away);
 }
 
 TEST_F(ServicesTest, ARenamedNodeProvidesNothingUnderItsOldName) {

@@ -28,6 +28,12 @@ inline ServiceTerms odometry() {
   return terms;
 }
 
+inline ServiceTerms commands() {
+  ServiceTerms terms;
+  terms.direction = proto::ns::Direction::accepts;
+  return terms;
+}
+
 /// The terms that a paced subscriber is held to now.
 inline std::string pace_text(const Topics& topics, const PaceDue& due) {
   const Topic* topic = topics.find_group(due.group);
@@ -60,6 +66,10 @@ inline std::vector<std::string> words(const Effects& effects, const Topics& topi
     } else if (const auto* forgotten = std::get_if<RetainedDropped>(&effect)) {
       result.push_back("forget " + std::to_string(forgotten->group.value()) + " of " +
                        std::to_string(forgotten->provider.value()));
+    } else if (const auto* accepting = std::get_if<AcceptanceChanged>(&effect)) {
+      const Topic* topic = topics.find_group(accepting->group);
+      const bool away = topic != nullptr && topic->service->provider_away;
+      result.push_back((away ? "away " : "there ") + std::to_string(accepting->group.value()));
     } else if (!std::holds_alternative<ServiceNoted>(effect)) {  // those are for watches_test.cpp
       result.emplace_back("other");
     }
