@@ -174,6 +174,13 @@ GIMNET_API gimi_status gimi_sender(gimi_handle node, gimi_peer to, const gimi_se
  * GIMI_NOT_DELIVERED (also of end_at_loss: nothing was sent), GIMI_TOO_LARGE. */
 GIMNET_API gimi_status gimi_send(gimi_handle sender, const void* data, size_t size,
                                  int32_t timeout_ms, int32_t more);
+/** gimi_send(), and waits for the acknowledgement of this one message, which has its place among
+ * all others of its stream; also without a window. GIMI_OK: it is in the queue of its receiver.
+ * GIMI_NOT_DELIVERED (why it is not, or may not be). GIMI_TIMEOUT: the sentence says whether it was
+ * sent; if so, it may still arrive. Waits at a full window, whatever gimi_send_options.at_full
+ * says. Others as gimi_send(). */
+GIMNET_API gimi_status gimi_send_confirmed(gimi_handle sender, const void* data, size_t size,
+                                           int32_t timeout_ms);
 /** Waits until nothing is unacknowledged. GIMI_OK: all that was sent so far was acknowledged.
  * GIMI_NOT_DELIVERED (how many were lost and why), GIMI_TIMEOUT. */
 GIMNET_API gimi_status gimi_settle(gimi_handle sender, int32_t timeout_ms);

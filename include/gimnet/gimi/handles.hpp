@@ -140,6 +140,14 @@ class Sender {
     return detail::outcome_of(gimi_send(handle_->value(), data.data(), data.size(),
                                         milliseconds_of(timeout), more == More::yes ? 1 : 0));
   }
+  /// send(), and waits for the acknowledgement of this one message; also without a window. Ok: it
+  /// is in the queue of its receiver. Errors: not_delivered (why it is not, or may not be), timeout
+  /// (the sentence says whether it was sent; if so, it may still arrive), others as send(). Waits
+  /// at a full window, whatever SendOptions::at_full says.
+  Outcome<void> send_confirmed(BytesView data, Timeout timeout = kForever) const {
+    return detail::outcome_of(
+        gimi_send_confirmed(handle_->value(), data.data(), data.size(), milliseconds_of(timeout)));
+  }
   /// Waits until nothing is unacknowledged. Ok: all that was sent so far was acknowledged.
   /// Errors: not_delivered (the sentence says how many were lost and why), timeout, closed.
   Outcome<void> settle(Timeout timeout = kForever) const {

@@ -17,16 +17,15 @@ bool at_or_before(std::uint32_t sequence, std::uint32_t other) {
   return static_cast<std::int32_t>(other - sequence) >= 0;
 }
 
-bool is_acknowledged(std::uint32_t sequence, std::uint32_t highest, std::uint64_t bitmap) {
+}  // namespace
+
+bool AckWindow::says_taken(std::uint32_t highest, std::uint64_t bitmap, std::uint32_t sequence) {
   const std::uint32_t behind = highest - sequence;
   if (behind == 0) return true;
   return behind <= 64 && ((bitmap >> (behind - 1)) & 1) != 0;
 }
 
-}  // namespace
-
 bool AckWindow::has_room(std::size_t bytes) const {
-  if (!synchronized()) return true;
   // The receiver's library holds so much for a program that stands still: no more may be under way,
   // or it would wait in a hub.
   const bool fits = unacknowledged_ == 0 || unacknowledged_bytes_ + bytes <= kWindowBytesMax;
@@ -44,11 +43,16 @@ void AckWindow::free(Waiting& waiting) {
 std::uint32_t AckWindow::open(std::size_t bytes, std::int64_t now_ns) {
   GIMNET_ASSERT(has_room(bytes));
   const std::uint32_t sequence = next_sequence_++;
-  if (!synchronized()) return sequence;
   waiting_.push_back({sequence, false, bytes, now_ns});
   ++unacknowledged_;
   unacknowledged_bytes_ += bytes;
   return sequence;
+}
+
+bool AckWindow::waits_for(std::uint32_t sequence) const {
+  return std::ranges::any_of(waiting_, [sequence](const Waiting& waiting) {
+    return waiting.sequence == sequence && !waiting.acknowledged;
+  });
 }
 
 bool AckWindow::cancel(std::uint32_t sequence) {
@@ -66,7 +70,7 @@ AckWindow::Freed AckWindow::acknowledge(std::uint32_t highest, std::uint64_t bit
   const bool answers_ping = pong != 0 && pong == ping_number_;
   for (Waiting& waiting : waiting_) {
     if (waiting.acknowledged) continue;
-    if (is_acknowledged(waiting.sequence, highest, bitmap)) {
+    if (says_taken(highest, bitmap, waiting.sequence)) {
       free(waiting);
       ++freed.acknowledged;
       if (waiting.sequence == highest && pong == 0) round_trip_ns_ = now_ns - waiting.sent_ns;

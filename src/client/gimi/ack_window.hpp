@@ -21,10 +21,12 @@ class AckWindow {
     [[nodiscard]] bool any() const { return acknowledged + lost != 0; }
   };
 
-  /// `messages_max` 1..kWindowMax; 0: nothing is counted, there is always room.
+  /// `messages_max` 1..kWindowMax.
   explicit AckWindow(std::size_t messages_max) : messages_max_(messages_max) {}
+  /// An ACK with that sequence and bitmap says that this message was taken.
+  [[nodiscard]] static bool says_taken(std::uint32_t highest, std::uint64_t bitmap,
+                                       std::uint32_t sequence);
 
-  [[nodiscard]] bool synchronized() const { return messages_max_ != 0; }
   /// For a message of so many bytes. A message always has room where no other waits, whatever its
   /// size.
   [[nodiscard]] bool has_room(std::size_t bytes) const;
@@ -33,6 +35,10 @@ class AckWindow {
 
   /// The sequence of the next DATA, which waits from now on. REQUIRES: has_room() for it.
   std::uint32_t open(std::size_t bytes, std::int64_t now_ns);
+  /// The sequence of the next DATA, for whose ACK nobody waits.
+  std::uint32_t pass() { return next_sequence_++; }
+  /// That DATA waits for its ACK.
+  [[nodiscard]] bool waits_for(std::uint32_t sequence) const;
   /// The DATA of the last open() was not sent. False: it did not wait any more.
   bool cancel(std::uint32_t sequence);
 

@@ -153,6 +153,14 @@ gimi_status gimi_send(gimi_handle sender, const void* data, size_t size, int32_t
   });
 }
 
+gimi_status gimi_send_confirmed(gimi_handle sender, const void* data, size_t size,
+                                int32_t timeout_ms) {
+  if (data == nullptr && size != 0) return is_null("gimi_send_confirmed(): data");
+  return with<SenderObject>(sender, [&](SenderObject& found) {
+    return answer(found.stream->send_confirmed(bytes_of(data, size), timeout_of(timeout_ms)));
+  });
+}
+
 gimi_status gimi_settle(gimi_handle sender, int32_t timeout_ms) {
   return with<SenderObject>(sender, [&](SenderObject& found) {
     return answer(found.stream->settle(timeout_of(timeout_ms)));

@@ -10,36 +10,76 @@ namespace {
 
 using proto::gimi::MessageOperation;
 
+proto::gimi::MessageHeader data_header(std::uint32_t sequence, bool asks, std::uint32_t epoch) {
+  const std::uint8_t flags = asks ? proto::gimi::kFlagAckWanted : std::uint8_t{0};
+  return {sequence, MessageOperation::data, flags, 0, epoch};
+}
+
 Loss withdrawn() { return {LossReason::service_gone, "the service was withdrawn"}; }
 
 }  // namespace
 
 Outcome<void> SendStream::send(BytesView data, Timeout timeout, More more) {
-  const std::int64_t deadline = deadline_after(timeout);
-  std::uint32_t sequence = 0;
+  return send(data, {.deadline_ns = deadline_after(timeout), .more = more});
+}
+
+Outcome<void> SendStream::send_confirmed(BytesView data, Timeout timeout) {
+  Confirmation confirmation;
+  const Order order{.deadline_ns = deadline_after(timeout), .confirmation = &confirmation};
+  auto fate = send(data, order);
+  const MutexLock lock(mutex_);
+  if (fate) fate = await(confirmation, order.deadline_ns);
+  std::erase(confirmations_, &confirmation);
+  return fate;
+}
+
+Outcome<void> SendStream::await(const Confirmation& confirmation, std::int64_t deadline_ns) {
+  while (!confirmation.decided() && !end_ && !is_over(deadline_ns))
+    static_cast<void>(changed_.wait_until(mutex_, deadline_ns));
+  if (confirmation.acknowledged) return {};
+  const std::string message = "the message to " + target();
+  if (confirmation.loss) {
+    return Failure{Status::not_delivered,
+                   message + " was not acknowledged: " + confirmation.loss.words};
+  }
+  if (end_) return end_.failure("learn whether " + message + " arrived");
+  return Failure{Status::timeout, message +
+                                      " was sent, and not acknowledged within the time given: "
+                                      "it may have arrived, or may still arrive"};
+}
+
+Outcome<void> SendStream::send(BytesView data, const Order& order) {
+  Departure departure{.asks = synchronized() || order.confirmation != nullptr, .more = order.more};
   Destination to;
   {
     const MutexLock lock(mutex_);
-    auto turn = take_turn(data, deadline);
+    auto turn = take_turn(data, order);
     if (!turn) return turn.failure();
     if (*turn == Turn::held) return {};
-    sequence = window_.open(data.size(), steady_now_ns());
+    departure.sequence =
+        departure.asks ? window_.open(data.size(), steady_now_ns()) : window_.pass();
+    if (order.confirmation != nullptr) {
+      order.confirmation->sequence = departure.sequence;
+      confirmations_.push_back(order.confirmation);
+    }
     to = destination_;
   }
-  const nif_status status = transmit(to, {sequence, MessageOperation::data, 0, 0, to.epoch}, data,
-                                     more, nif_timeout_until(deadline));
+  const nif_status status = transmit(to, data_header(departure.sequence, departure.asks, to.epoch),
+                                     data, order.more, nif_timeout_until(order.deadline_ns));
   auto failure = status == NIF_OK ? Failure{} : failure_of(status, "send to " + target());
   bool unwatched = false;
   {
     const MutexLock lock(mutex_);
-    unwatched = finish(sequence, status, more);
+    unwatched = finish(departure, status);
   }
   if (unwatched) watch_if_needed();
   if (status == NIF_OK) return {};
   return failure;
 }
 
-Outcome<SendStream::Turn> SendStream::take_turn(BytesView data, std::int64_t deadline) {
+Outcome<SendStream::Turn> SendStream::take_turn(BytesView data, const Order& order) {
+  // A message to be confirmed waits for room, whatever others of its stream do.
+  const bool waits = order.confirmation != nullptr || options_.at_full == AtFullWindow::wait;
   while (!end_) {
     if (options_.end_at_loss && counts_.lost != 0) return loss();
     if (destination_.id == 0) {
@@ -48,30 +88,31 @@ Outcome<SendStream::Turn> SendStream::take_turn(BytesView data, std::int64_t dea
           "not sent to " + service_ +
               ": nobody accepts it at the moment; it can be sent to again when it is back"};
     }
-    const bool room = window_.has_room(data.size());
+    const bool asks = synchronized() || order.confirmation != nullptr;
+    const bool room = !asks || window_.has_room(data.size());
     if (!sending_ && room) {
       if (std::exchange(held_, std::nullopt)) ++counts_.skipped;
       sending_ = true;
       return Turn::send;
     }
-    if (!room && options_.at_full == AtFullWindow::skip) {
+    if (!room && !waits && options_.at_full == AtFullWindow::skip) {
       ++counts_.skipped;
       return Failure{Status::window_full, "not sent to " + target() + ": " +
                                               std::to_string(window_.size()) +
                                               " messages wait for their acknowledgement"};
     }
-    if (!room && options_.at_full == AtFullWindow::hold_latest) {
+    if (!room && !waits) {
       hold(data);
       return Turn::held;
     }
     // Nobody acknowledges what was not written.
     if (std::exchange(unflushed_, false)) static_cast<void>(nif_flush(uplink_.node()));
-    if (is_over(deadline)) {
+    if (is_over(order.deadline_ns)) {
       return Failure{Status::timeout,
                      "not sent to " + target() +
                          ": earlier messages were not acknowledged within the time given"};
     }
-    static_cast<void>(changed_.wait_until(mutex_, deadline));
+    static_cast<void>(changed_.wait_until(mutex_, order.deadline_ns));
   }
   return end_.failure("send to " + target());
 }
@@ -95,37 +136,35 @@ void SendStream::hold_again(std::vector<std::byte> data) {
 
 nif_status SendStream::transmit(const Destination& to, const proto::gimi::MessageHeader& header,
                                 BytesView data, More more, std::int32_t timeout_ms) const {
-  const bool synchronized = options_.window != 0;
   Envelope envelope{to.id, to.kind, NIF_POLICY_DEFAULT, options_.lane, to.key, options_.age_ms_max,
                     0};
-  if (synchronized) envelope.flags |= NIF_FLAG_REPORT;
+  if (header.has(proto::gimi::kFlagAckWanted)) envelope.flags |= NIF_FLAG_REPORT;
   if (more == More::yes) envelope.flags |= NIF_FLAG_MORE;
-  proto::gimi::MessageHeader asking = header;
-  if (synchronized) asking.flags |= proto::gimi::kFlagAckWanted;
   const bool stamped = options_.timestamp && header.operation == MessageOperation::data;
-  return uplink_.transmit(envelope, asking, stamped, data, timeout_ms);
+  return uplink_.transmit(envelope, header, stamped, data, timeout_ms);
 }
 
 nif_status SendStream::transmit_ping(const Destination& to, std::uint32_t number) const {
   std::array<std::byte, proto::gimi::kPingTimeSize> sent;
   store_le(sent.data(), wall_now_ns());
-  return transmit(to, {number, MessageOperation::ping, 0, 0, to.epoch}, sent, More::no, 0);
+  return transmit(to, {number, MessageOperation::ping, proto::gimi::kFlagAckWanted, 0, to.epoch},
+                  sent, More::no, 0);
 }
 
 /// True: somebody should watch over the stream. Another thread may have left a message to be held
 /// while this one was sending: it goes by tick() only, also where this one was not sent, or is
 /// acknowledged already.
-bool SendStream::finish(std::uint32_t sequence, nif_status status, More more) {
+bool SendStream::finish(const Departure& departure, nif_status status) {
   sending_ = false;
   changed_.notify_all();
   if (status != NIF_OK) {
     // It may have been given up with all others meanwhile; then it counts as never sent all the
     // same.
-    if (window_.synchronized() && !window_.cancel(sequence) && counts_.lost != 0) --counts_.lost;
+    if (departure.asks && !window_.cancel(departure.sequence) && counts_.lost != 0) --counts_.lost;
     if (window_.empty()) forget_doubts();
   } else {
     ++counts_.sent;
-    unflushed_ = more == More::yes;
+    unflushed_ = departure.more == More::yes;
   }
   return (!window_.empty() || held_) && !watched_;
 }
@@ -177,6 +216,9 @@ void SendStream::settle_freed(const AckWindow::Freed& freed, const Loss& why) {
     counts_.loss = why.words;
     counts_.loss_reason = why.reason;
   }
+  for (Confirmation* each : confirmations_) {
+    if (!each->decided() && !window_.waits_for(each->sequence)) each->loss = why;
+  }
   changed_.notify_all();
 }
 
@@ -185,10 +227,15 @@ bool SendStream::on_ack(std::uint32_t sequence, const proto::gimi::Ack& ack) {
   const bool answers = ack.pong_sequence != 0 && ack.pong_sequence == window_.ping_number();
   const AckWindow::Freed freed =
       window_.acknowledge(sequence, ack.bitmap, ack.pong_sequence, steady_now_ns());
+  for (Confirmation* each : confirmations_) {
+    if (!each->decided())
+      each->acknowledged = AckWindow::says_taken(sequence, ack.bitmap, each->sequence);
+  }
   const Loss& doubt = asked_ ? asked_ : doubt_;
-  settle_freed(freed, doubt ? doubt
-                            : Loss{LossReason::not_received,
-                                   "the receiver answered a later question, but did not get them"});
+  settle_freed(freed,
+               doubt ? doubt
+                     : Loss{LossReason::not_received,
+                            "the receiver answered a later question, but this did not arrive"});
   if (answers) asked_ = {};
   if (freed.lost != 0 || window_.empty()) forget_doubts();
   return held_ && window_.has_room(held_->size());
@@ -288,9 +335,9 @@ bool SendStream::tick(std::int64_t now_ns) {
   }
   if (data) {
     const nif_status status =
-        transmit(to, {sequence, MessageOperation::data, 0, 0, to.epoch}, *data, More::no, 0);
+        transmit(to, data_header(sequence, true, to.epoch), *data, More::no, 0);
     const MutexLock lock(mutex_);
-    static_cast<void>(finish(sequence, status, More::no));
+    static_cast<void>(finish({.sequence = sequence, .asks = true}, status));
     // Before the turn is anybody else's, whose message is newer.
     if (status != NIF_OK) hold_again(std::move(*data));
     return true;

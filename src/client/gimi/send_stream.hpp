@@ -50,7 +50,7 @@ class SendStream {
         to_(to),
         options_(options),
         destination_{NIF_UNICAST, to.id, options.key, Uplink::draw_epoch()},
-        window_(options.window) {}
+        window_(window_of(options)) {}
   /// `service`: its full name.
   SendStream(Uplink& uplink, StreamKeeper& keeper, std::string service, const ServicePlace& place,
              const SendOptions& options)
@@ -60,9 +60,12 @@ class SendStream {
         options_(options),
         place_(place),
         destination_{NIF_SERVICE, place.destination(), place.key, Uplink::draw_epoch()},
-        window_(options.window) {}
+        window_(window_of(options)) {}
 
   [[nodiscard]] Outcome<void> send(BytesView data, Timeout timeout, More more)
+      GIMNET_EXCLUDES(mutex_);
+  /// send(), and waits for what becomes of this one message; also of a stream without a window.
+  [[nodiscard]] Outcome<void> send_confirmed(BytesView data, Timeout timeout)
       GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] Outcome<void> settle(Timeout timeout) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] SendCounts counts() GIMNET_EXCLUDES(mutex_);
@@ -105,15 +108,40 @@ class SendStream {
     MessageKey key;
     std::uint32_t epoch = 0;
   };
+  /// A message for whose fate its thread waits.
+  struct Confirmation {
+    std::uint32_t sequence = 0;
+    bool acknowledged = false;
+    Loss loss;  ///< set once it is lost
+    [[nodiscard]] bool decided() const { return acknowledged || loss; }
+  };
+  /// The terms of one call of send().
+  struct Order {
+    std::int64_t deadline_ns = 0;
+    More more = More::no;
+    Confirmation* confirmation = nullptr;  ///< null: nobody waits for the fate of this message
+  };
+  /// A message between its sequence and NIF.
+  struct Departure {
+    std::uint32_t sequence = 0;
+    bool asks = false;  ///< for an ACK
+    More more = More::no;
+  };
+  /// A stream without a window has as much room for messages to be confirmed as the largest one.
+  [[nodiscard]] static std::size_t window_of(const SendOptions& options) {
+    return options.window != 0 ? options.window : kWindowMax;
+  }
+  [[nodiscard]] bool synchronized() const { return options_.window != 0; }
+  [[nodiscard]] Outcome<void> send(BytesView data, const Order& order) GIMNET_EXCLUDES(mutex_);
   /// Waits for this thread's turn, and for room in the window. After Turn::send `sending_` is this
   /// thread's.
-  [[nodiscard]] Outcome<Turn> take_turn(BytesView data, std::int64_t deadline)
+  [[nodiscard]] Outcome<Turn> take_turn(BytesView data, const Order& order) GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] Outcome<void> await(const Confirmation& confirmation, std::int64_t deadline_ns)
       GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status transmit(const Destination& to, const proto::gimi::MessageHeader& header,
                                     BytesView data, More more, std::int32_t timeout_ms) const;
   [[nodiscard]] nif_status transmit_ping(const Destination& to, std::uint32_t number) const;
-  [[nodiscard]] bool finish(std::uint32_t sequence, nif_status status, More more)
-      GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] bool finish(const Departure& departure, nif_status status) GIMNET_REQUIRES(mutex_);
   void hold(BytesView data) GIMNET_REQUIRES(mutex_);
   void hold_again(std::vector<std::byte> data) GIMNET_REQUIRES(mutex_);
   void lose_all(const Loss& why) GIMNET_REQUIRES(mutex_);
@@ -136,6 +164,8 @@ class SendStream {
   Destination destination_ GIMNET_GUARDED_BY(mutex_);
   AckWindow window_ GIMNET_GUARDED_BY(mutex_);
   SendCounts counts_ GIMNET_GUARDED_BY(mutex_);
+  /// One for each thread in send_confirmed(). Limit: the threads of the program.
+  std::vector<Confirmation*> confirmations_ GIMNET_GUARDED_BY(mutex_);
   std::optional<std::vector<std::byte>> held_ GIMNET_GUARDED_BY(mutex_);
   bool sending_ GIMNET_GUARDED_BY(mutex_) = false;  ///< one thread is between a sequence and NIF
   bool unflushed_ GIMNET_GUARDED_BY(mutex_) =

@@ -62,12 +62,25 @@ TEST(AckWindow, BytesAreFreedHoweverAMessageEnds) {
   EXPECT_FALSE(window.has_room(kWindowBytesMax));
 }
 
-TEST(AckWindow, CountsNothingWhenUnsynchronized) {
-  AckWindow window(0);
-  for (std::uint32_t sequence = 1; sequence <= 1000; ++sequence)
-    EXPECT_EQ(window.open(1, 0), sequence);
+TEST(AckWindow, CountsNothingOfWhatPasses) {
+  AckWindow window(1);
+  for (std::uint32_t sequence = 1; sequence <= 1000; ++sequence) EXPECT_EQ(window.pass(), sequence);
   EXPECT_TRUE(window.has_room(1));
   EXPECT_TRUE(window.empty());
+}
+
+TEST(AckWindow, KeepsTheOldestInReachOfAnyAckAmongWhatPasses) {
+  AckWindow window(64);
+  window.open(1, 0);
+  for (int i = 0; i < 63; ++i) window.pass();
+  EXPECT_TRUE(window.has_room(1));
+  window.pass();
+  EXPECT_FALSE(window.has_room(1));
+  EXPECT_TRUE(window.waits_for(1));
+  EXPECT_FALSE(window.waits_for(2));
+  EXPECT_EQ(window.acknowledge(64, kAll, 0, kMs).acknowledged, 1u);
+  EXPECT_FALSE(window.waits_for(1));
+  EXPECT_TRUE(window.has_room(1));
 }
 
 TEST(AckWindow, OneAckSpeaksOfMany) {

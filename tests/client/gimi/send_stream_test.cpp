@@ -289,7 +289,7 @@ class SettledDoubt : public Conversation {
     acknowledge(1, 0, next_ping());
     EXPECT_TRUE(stream_.settle().is(Status::not_delivered));
     EXPECT_EQ(stream_.counts().loss,
-              "the receiver answered a later question, but did not get them");
+              "the receiver answered a later question, but this did not arrive");
     EXPECT_EQ(stream_.counts().loss_reason, LossReason::not_received);
   }
 
