@@ -271,11 +271,23 @@ class Node(Waitable):
                          timeout_ms=to_ms(timeout))
         return Source(self, self._opened(_c.lib.gimi_accept, to_text(name), options), kept=True)
 
-    def send(self, to: Union[str, Peer], value: Any, timeout: float = 1.0, *, lane: str = "normal") -> None:
+    def send(self, to: Union[str, Peer], value: Any, timeout: float = 1.0, *, lane: str = "normal",
+             confirm: bool = False) -> None:
         """Sends to the service of that full name, or to a Peer of find(). `lane`: as of advertise(), and
-        the same each time. NotFound, Timeout (not sent), NotConnected, NotDelivered, BadArgument."""
+        the same each time. It does not tell if the message is lost on its way. With `confirm` it waits until the
+        receiver has the message in its queue. NotFound, Timeout (not sent, or not confirmed: it may still arrive),
+        NotConnected, NotDelivered (why it is lost, or may be), BadArgument."""
         sender = self._sender(to, lane, timeout)
         data, size, keeps = messages.payload(value)
+        if confirm:
+            ms = to_ms(timeout)
+
+            def call(_: Any = keeps) -> None:
+                """In one piece: a second call would send the message a second time."""
+                self.check(_c.lib.gimi_send_confirmed(sender, data, size, ms))
+
+            interruptible(call)
+            return
         status = in_pieces(timeout, lambda ms: _c.lib.gimi_send(sender, data, size, ms, 0))
         del keeps
         self.check(status)
