@@ -366,7 +366,8 @@ typedef enum nif_incoming_type {
   NIF_REPORT = 1,
   /** Messages were lost [from: the sender; 0: any to this node; reason, text: its name; count: so
    * many messages]. `cut_message`: a part did not come, or the connection broke before it.
-   * `too_large`. With `link_lost` the count is of frames, of which a large message has many, or
+   * `too_large`: one message [also to, kind, lane, flags and key; payload: its first bytes, at most
+   * 64]. With `link_lost` the count is of frames, of which a large message has many, or
    * NIF_COUNT_UNKNOWN: they had left a resume buffer unconfirmed when the connection broke, that of
    * the hub or, from the own id, of this node. `no_such_group`, from the own id: so many frames to
    * own services had waited over a break, and the hub did not take their services again.

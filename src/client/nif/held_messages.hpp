@@ -19,6 +19,7 @@ struct SendProgress {
   std::uint32_t number = 0;  ///< 0: not begun
   std::uint64_t epoch = 0;
   std::uint32_t dst = 0;
+  std::uint64_t tag = 0;  ///< as Outgoing::tag()
   bool windowed = false;
   bool refused = false;
   proto::DropReason undelivered = proto::DropReason::none;

@@ -196,7 +196,7 @@ Inbound::Verdict Inbound::take_fragment(const proto::FrameView& view, const std:
     const bool too_large = reassembled.state == proto::Reassembled::State::too_large;
     if (too_large) --cut;  // this one; others ended before it
     if (cut > 0) add_gap(view.header.src, cut, proto::DropReason::cut_message);
-    if (too_large) add_gap(view.header.src, 1, proto::DropReason::too_large);
+    if (too_large) add_too_large(view, frame);
   }
   counts_.messages_lost += reassembled.displaced.size();
   for (const std::uint32_t source : reassembled.displaced)
@@ -278,6 +278,11 @@ void Inbound::add_gap(std::uint32_t from, std::uint64_t count, proto::DropReason
   record->incoming.count = count;
   record->incoming.reason = static_cast<std::uint32_t>(reason);
   add_record(record, 0);
+}
+
+void Inbound::add_too_large(const proto::FrameView& view, const std::byte* frame) {
+  ++counts_.gaps;
+  add_record(make_too_large(incoming_of({nullptr, frame, 0, 0, 0}), view.payload), 0);
 }
 
 Inbound::Verdict Inbound::take_flow(const proto::FrameView& view) {

@@ -139,6 +139,8 @@ class Inbound {
   void add_events(std::span<const Item> events);
   [[nodiscard]] std::uint32_t epoch_of(const proto::FrameHeader& header);
   void add_gap(std::uint32_t from, std::uint64_t count, proto::DropReason reason);
+  /// The first fragment came of a message that is larger than this end takes.
+  void add_too_large(const proto::FrameView& view, const std::byte* frame);
   void add_moved(const proto::ns::ServiceMoved& event);
   void deliver();
   void tell_taken(const std::vector<MessageAssembler::Notice>& notices);

@@ -112,6 +112,7 @@ nif_status MessageSender::send_fragments(Outgoing& message, Deadline deadline, M
   if (turn != NIF_OK) return turn;
   SendProgress progress{.number = 0,
                         .dst = message.parts().header.dst,
+                        .tag = message.tag(),
                         .windowed = message.parts().header.kind == proto::Kind::unicast &&
                                     message.size() > proto::kWindowDefault,
                         .window = proto::SendWindow(0, message.size())};

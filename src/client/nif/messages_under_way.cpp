@@ -129,4 +129,8 @@ void MessagesUnderWay::on_report(const proto::Report& report) {
     progress.undelivered = report.reason;
 }
 
+void MessagesUnderWay::refuse(std::uint64_t tag) {
+  for (auto& [stream, progress] : by_stream_) progress->refused |= progress->tag == tag;
+}
+
 }  // namespace gimnet::nif

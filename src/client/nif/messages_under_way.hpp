@@ -68,6 +68,9 @@ class MessagesUnderWay {
   [[nodiscard]] std::optional<proto::Report> on_taken(std::uint32_t from,
                                                       const proto::Taken& taken);
   void on_report(const proto::Report& report);
+  /// The receiver of the message with that tag says that it is larger than it takes. REQUIRES: not
+  /// 0.
+  void refuse(std::uint64_t tag);
 
  private:
   [[nodiscard]] bool put(HeldMessage& held, SendGate& gate, FrameAppender& frames, Put& all) const;

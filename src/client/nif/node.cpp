@@ -40,9 +40,10 @@ nif_counters Node::counters() {
   return whole;
 }
 
-nif_status Node::send(const nif_outgoing& message, std::int32_t timeout_ms) {
+nif_status Node::send(const nif_outgoing& message, std::int32_t timeout_ms, std::uint64_t tag) {
   Outgoing outgoing;
   if (const auto failure = outgoing.read(message, &parts_.clock)) return fail(*failure);
+  outgoing.set_tag(tag);
   const bool may_wait = timeout_ms != 0 && !thread_.is_current();
   return parts_.outbound.send(outgoing, may_wait ? deadline_after(timeout_ms) : 0);
 }

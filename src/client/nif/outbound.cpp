@@ -288,6 +288,13 @@ bool Outbound::on_confirm(std::uint64_t count) {
   return possible;
 }
 
+void Outbound::give_up(std::uint64_t tag) {
+  const MutexLock lock(mutex_);
+  under_way_.refuse(tag);
+  waiters_.notify();
+  write_held();
+}
+
 std::optional<proto::Report> Outbound::on_taken(std::uint32_t from, const proto::Taken& taken) {
   const MutexLock lock(mutex_);
   const auto report = under_way_.on_taken(from, taken);

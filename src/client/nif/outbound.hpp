@@ -68,6 +68,9 @@ class Outbound final : private SocketWriter::Source {
   /// kept, see LastMessages.
   void follow_retained(const std::string& service, std::uint32_t group) GIMNET_EXCLUDES(mutex_);
   void forget_retained(const std::string& service) GIMNET_EXCLUDES(mutex_);
+  /// The receiver of the message that was sent with that tag does not take it, since it is too
+  /// large: its rest does not go any more.
+  void give_up(std::uint64_t tag) GIMNET_EXCLUDES(mutex_);
   /// Waits until connected. NIF_OK, or why it will not be.
   [[nodiscard]] nif_status wait_connected(Deadline deadline) GIMNET_EXCLUDES(mutex_);
   void add_counters(nif_counters& counters) GIMNET_EXCLUDES(mutex_);

@@ -42,6 +42,10 @@ class Outgoing {
   void redirect(std::uint32_t dst);
   [[nodiscard]] bool reported() const { return parts_.header.has(proto::kFlagReport); }
 
+  /// By which give_up() of Outbound finds it; 0: it does not.
+  [[nodiscard]] std::uint64_t tag() const { return tag_; }
+  void set_tag(std::uint64_t tag) { tag_ = tag; }
+
   /// The same message with a copy of the payload from `offset` on; nothing before that can be
   /// written. May throw std::bad_alloc.
   [[nodiscard]] std::unique_ptr<Outgoing> copy_rest(std::uint32_t offset);
@@ -75,6 +79,7 @@ class Outgoing {
   std::span<const nif_bytes> payload_;
   std::uint32_t size_ = 0;
   std::uint64_t stream_ = 0;
+  std::uint64_t tag_ = 0;
   bool more_ = false;
   bool not_while_away_ = false;
   bool patient_ = true;

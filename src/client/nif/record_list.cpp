@@ -1,5 +1,6 @@
 #include "client/nif/record_list.hpp"
 
+#include <algorithm>
 #include <array>
 #include <memory>
 #include <span>
@@ -101,6 +102,21 @@ Record* make_report(const proto::Report& report, std::uint32_t from) {
   std::array<std::byte, proto::kReportSizeMax> whole;
   const std::size_t size = proto::encode_report(report, whole);
   if (record->payload.append(std::span(whole).first(size).subspan(8))) record->finish();
+  return record;
+}
+
+Record* make_too_large(const nif_incoming& begun, std::span<const std::byte> payload) {
+  constexpr auto kReason = proto::DropReason::too_large;
+  Record* record = make_event(NIF_GAP, proto::drop_reason_name(kReason));
+  nif_incoming& in = record->incoming;
+  in = begun;
+  in.type = NIF_GAP;
+  in.count = 1;
+  in.reason = static_cast<std::uint32_t>(kReason);
+  in.payload = in.extensions = nullptr;
+  in.size = in.extensions_size = 0;
+  static_cast<void>(record->payload.append(payload.first(std::min(payload.size(), kBeginningMax))));
+  record->finish();
   return record;
 }
 

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,10 @@ namespace gimnet::nif {
 [[nodiscard]] Record* make_event(nif_incoming_type type, std::string text);
 /// A NIF_REPORT of the hub `from`: what became of frames that this node sent.
 [[nodiscard]] Record* make_report(const proto::Report& report, std::uint32_t from);
+/// A NIF_GAP of a message that is too large, which begins with `payload`. `begun`: its first
+/// fragment, as a message. The first kBeginningMax bytes are copied: they hold its GIMI header.
+inline constexpr std::size_t kBeginningMax = 64;
+[[nodiscard]] Record* make_too_large(const nif_incoming& begun, std::span<const std::byte> payload);
 /// Its place in the receive queue; the reference goes with it.
 [[nodiscard]] Item item_of(Record* record, std::size_t bytes);
 

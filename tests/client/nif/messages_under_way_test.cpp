@@ -227,6 +227,25 @@ TEST(MessagesUnderWay, TheReportOfAHeldMessageThatItsReceiverGaveUpIsForTheProgr
   EXPECT_TRUE(node.result.ended);
 }
 
+TEST(MessagesUnderWay, TheRestOfAMessageThatItsReceiverRefusedDoesNotGo) {
+  Sending node;
+  Large refused(kGroup, kLarge, NIF_SERVICE);
+  Large taken(kGroup + 1, kHeldMax - kLarge, NIF_SERVICE);
+  refused.progress.tag = 5;
+  taken.progress.tag = 6;
+  node.hold(refused, 7);
+  node.hold(taken, 8);
+  node.messages.refuse(5);
+  const std::size_t before = node.put_held();  // until one has ended
+  EXPECT_EQ(before + node.put_held(), kHeldMax - kLarge) << "the other one";
+  EXPECT_FALSE(node.messages.holds_any());
+  node.messages.add(refused.message, refused.progress);
+  node.messages.begin(refused.message, refused.progress, 9);
+  EXPECT_EQ(node.messages.check(refused.progress), NIF_OK);
+  node.messages.refuse(5);
+  EXPECT_EQ(node.messages.check(refused.progress), NIF_TOO_LARGE);
+}
+
 TEST(MessagesUnderWay, AHeldMessageIsLostWithItsService) {
   Sending node;
   Large large(kGroup, kLarge, NIF_GROUP);
