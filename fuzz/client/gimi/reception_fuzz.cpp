@@ -78,6 +78,7 @@ class World final : public nif::InboundHost {
       nif_incoming in = nif::incoming_of(item);
       FUZZ_MUST(in.type == NIF_MESSAGE || in.type == NIF_GAP);
       const nif_verdict verdict = in.type == NIF_MESSAGE ? reception_.on_message(in) : NIF_DONE;
+      if (in.type == NIF_GAP) reception_.on_too_large(in);
       FUZZ_MUST(verdict != NIF_NOT_NOW);
       if (verdict == NIF_DONE) nif_release(&in);
     }

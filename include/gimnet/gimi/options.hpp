@@ -55,8 +55,8 @@ struct NodeOptions {
   /// Join as one who may change the hub: over its Unix socket, as root or as the user that runs it.
   /// Else: denied.
   bool administrator = false;
-  /// Largest message taken, in bytes of the application, up to 1 GiB. A larger one is dropped; its
-  /// sender is told if it waits for an ACK.
+  /// Largest message taken, in bytes of the application, up to 1 GiB. A larger one is dropped. Its
+  /// sender is told if it waits for an ACK, or still sends: too_large.
   std::size_t message_bytes_max = std::size_t{64} << 20;
   std::size_t receive_bytes = std::size_t{16}
                               << 20;  ///< may wait unread when a queue holds the reading back

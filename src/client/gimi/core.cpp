@@ -252,6 +252,10 @@ void Core::on_gap(const nif_incoming& in) {
   const auto reason = static_cast<proto::DropReason>(in.reason);
   if (reason == proto::DropReason::queue_full || reason == proto::DropReason::over_budget)
     return losses_.add_queue_full(in.from, in.count);
+  if (reason == proto::DropReason::too_large) {
+    losses_.add(reason, 1);
+    return reception_.on_too_large(in);
+  }
   // From itself: what this node sent. Its streams learn of the break by themselves.
   if (in.from == nif_id(node())) return;
   losses_.add(reason, in.count == NIF_COUNT_UNKNOWN ? 1 : in.count);

@@ -34,7 +34,8 @@ Ended reply_of(const proto::gimi::RequestError& error, const std::string& servic
       return without_reply(Status::not_found, not_done, words + "nobody answers there any more");
     case RequestFault::too_large:
       return without_reply(Status::too_large, not_done,
-                           words + "the request is larger than it takes");
+                           words + "the request is too large" +
+                               (error.sentence.empty() ? "" : ": ") + std::string(error.sentence));
     case RequestFault::let_go:
       return without_reply(Status::gone, Ran::maybe,
                            words + "the program took the request and did not answer it");

@@ -105,7 +105,7 @@ nif_verdict Reception::on_message(const nif_incoming& in) {
     case MessageOperation::request:
       return on_request(in, *view);
     case MessageOperation::reply:
-      return on_reply(in, *view);
+      return on_reply(in, *view, view->data.size() > message_bytes_max_);
     case MessageOperation::ack:
       on_ack(in, *view);
       return NIF_DONE;
@@ -222,19 +222,74 @@ nif_verdict Reception::on_group_data(const nif_incoming& in, const proto::gimi::
 nif_verdict Reception::refuse(const nif_incoming& in, const proto::gimi::MessageView& view) {
   inbox_.count_dropped();
   losses_.add(proto::DropReason::too_large, 1);
-  if (!is_for_one(in) || !view.header.has(proto::gimi::kFlagAckWanted)) return NIF_DONE;
-  const std::string sentence = "it takes messages of at most " +
-                               std::to_string(message_bytes_max_) + " bytes, and this one has " +
-                               std::to_string(view.data.size());
+  if (in.kind == NIF_GROUP) miss(in, view.header);
+  if (is_for_one(in) && view.header.has(proto::gimi::kFlagAckWanted))
+    tell_too_large(in, view.header, "has " + std::to_string(view.data.size()));
+  return NIF_DONE;
+}
+
+std::string Reception::limit_words() const {
+  return "it takes messages of at most " + std::to_string(message_bytes_max_) + " bytes";
+}
+
+void Reception::tell_too_large(const nif_incoming& in, const proto::gimi::MessageHeader& data,
+                               const std::string& size) {
+  const std::string sentence = limit_words() + ", and this one " + size;
   const StreamName name = received_stream_of(in);
   const Envelope envelope{
       in.from, NIF_UNICAST, NIF_POLICY_DEFAULT, static_cast<Lane>(in.lane), name.key, 0, 0};
   // If there is no room for it, the sender learns from the next PONG that the message is missing.
   static_cast<void>(uplink_.transmit(
-      envelope,
-      {view.header.sequence, proto::gimi::MessageOperation::error, 0, 0, view.header.epoch}, false,
+      envelope, {data.sequence, proto::gimi::MessageOperation::error, 0, 0, data.epoch}, false,
       proto::gimi::encode_error({kTooLarge, sentence, name.group}), 0));
-  return NIF_DONE;
+}
+
+void Reception::miss(const nif_incoming& in, const proto::gimi::MessageHeader& data) {
+  const auto [place, service] = services_.subscribed(in.group != 0 ? in.group : in.to);
+  const StreamName name = stream_of(in, in.from, 0);
+  if (service != nullptr) service->miss({name.peer, name.key, data.epoch, data.sequence});
+}
+
+void Reception::on_too_large(const nif_incoming& in) {
+  using proto::gimi::MessageOperation;
+  const auto view = proto::gimi::parse_message(payload_of(in));
+  if ((in.flags & NIF_FLAG_KEYED) == 0 || !view) return;
+  const bool may_answer = is_for_one(in) && in.from != 0;
+  switch (view->header.operation) {
+    case MessageOperation::data:
+      if (in.kind == NIF_GROUP) return miss(in, view->header);
+      // Of UNICAST, NIF has told the sender by a TAKEN.
+      if (in.kind == NIF_SERVICE && may_answer) tell_too_large(in, view->header, "is larger");
+      return;
+    case MessageOperation::request:
+      if (may_answer) answer_fault(in, view->header, proto::gimi::RequestFault::too_large);
+      return;
+    case MessageOperation::reply: {
+      nif_incoming beginning = in;
+      beginning.storage = nullptr;  // NIF keeps that of an event
+      static_cast<void>(on_reply(beginning, *view, true));
+      return;
+    }
+    default:
+      return;
+  }
+}
+
+void Reception::answer_fault(const nif_incoming& in, const proto::gimi::MessageHeader& request,
+                             proto::gimi::RequestFault fault) {
+  const auto key = proto::gimi::StreamKey::of(in.key);
+  const Envelope envelope{in.from,
+                          NIF_UNICAST,
+                          NIF_POLICY_DEFAULT,
+                          static_cast<Lane>(in.lane),
+                          {key.type, key.instance},
+                          0,
+                          0};
+  const bool too_large = fault == proto::gimi::RequestFault::too_large;
+  const std::string sentence = too_large ? limit_words() : "";
+  static_cast<void>(uplink_.transmit(
+      envelope, {request.sequence, proto::gimi::MessageOperation::error, 0, 0, request.epoch},
+      false, proto::gimi::encode_request_error({fault, 0, sentence}), 0));
 }
 
 nif_verdict Reception::on_request(const nif_incoming& in, const proto::gimi::MessageView& view) {
@@ -252,22 +307,16 @@ nif_verdict Reception::on_request(const nif_incoming& in, const proto::gimi::Mes
   if (queue != nullptr && !too_large) {
     if (queue->on_request(view.header, message, body->left_ms)) return NIF_KEEP;
   } else {
-    const RequestFault fault = too_large ? RequestFault::too_large : RequestFault::nobody;
-    const Envelope envelope{
-        in.from, NIF_UNICAST, NIF_POLICY_DEFAULT, message.lane(), message.key(), 0, 0};
-    static_cast<void>(uplink_.transmit(
-        envelope,
-        {view.header.sequence, proto::gimi::MessageOperation::error, 0, 0, view.header.epoch},
-        false, proto::gimi::encode_request_error({fault, 0, ""}), 0));
+    answer_fault(in, view.header, too_large ? RequestFault::too_large : RequestFault::nobody);
   }
   disown(std::move(message));
   return NIF_DONE;
 }
 
-nif_verdict Reception::on_reply(const nif_incoming& in, const proto::gimi::MessageView& view) {
+nif_verdict Reception::on_reply(const nif_incoming& in, const proto::gimi::MessageView& view,
+                                bool too_large) {
   Message reply = make_message(in, view, nullptr, reconnects_);
-  if (requests_.on_reply(view.header, reply, view.data.size() > message_bytes_max_))
-    return NIF_KEEP;
+  if (requests_.on_reply(view.header, reply, too_large)) return NIF_KEEP;
   disown(std::move(reply));
   return NIF_DONE;
 }
@@ -277,13 +326,16 @@ void Reception::on_error(const nif_incoming& in, const proto::gimi::MessageView&
     const auto error = proto::gimi::decode_request_error(view.data);
     if (!error) return losses_.add_unreadable();
     const std::string sentence = plain_words(error->sentence);
-    return requests_.on_error(view.header, Peer{in.from}, {error->fault, error->code, sentence});
+    requests_.on_error(view.header, Peer{in.from}, {error->fault, error->code, sentence});
+    if (error->fault == proto::gimi::RequestFault::too_large) uplink_.give_up(view.header);
+    return;
   }
   const auto failure = proto::gimi::decode_error(view.data);
   if (!failure || failure->status != kTooLarge) return inbox_.count_dropped();
-  streams_.on_refused(
+  const bool known = streams_.on_refused(
       stream_of(in, in.from, failure->group), view.header,
       {LossReason::refused, "the receiver refused it: " + plain_words(failure->sentence)});
+  if (known) uplink_.give_up(view.header);
 }
 
 void Reception::on_ack(const nif_incoming& in, const proto::gimi::MessageView& view) {

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <string>
 
 #include "client/gimi/accepted_service.hpp"
 #include "client/gimi/answer_queue.hpp"
@@ -17,6 +18,7 @@
 #include "client/gimi/uplink.hpp"
 #include "gimnet/nif.h"
 #include "proto/gimi/message_header.hpp"
+#include "proto/gimi/request.hpp"
 
 namespace gimnet::gimi {
 
@@ -60,6 +62,9 @@ class Reception {
   /// NIF_KEEP: a queue has it, with its storage.
   [[nodiscard]] nif_verdict on_message(const nif_incoming& in);
   void on_report(const nif_incoming& in);
+  /// A NIF_GAP of one message that is larger than this node takes, with its beginning: its sender
+  /// or its subscribers are told.
+  void on_too_large(const nif_incoming& in);
   /// Messages that come from now on came behind another break.
   void on_reconnected() { ++reconnects_; }
 
@@ -67,7 +72,8 @@ class Reception {
   [[nodiscard]] nif_verdict on_data(const nif_incoming& in, const proto::gimi::MessageView& view);
   [[nodiscard]] nif_verdict on_request(const nif_incoming& in,
                                        const proto::gimi::MessageView& view);
-  [[nodiscard]] nif_verdict on_reply(const nif_incoming& in, const proto::gimi::MessageView& view);
+  [[nodiscard]] nif_verdict on_reply(const nif_incoming& in, const proto::gimi::MessageView& view,
+                                     bool too_large);
   /// A message without a GIMI header.
   [[nodiscard]] nif_verdict on_plain(const nif_incoming& in);
   [[nodiscard]] nif_verdict on_group_data(const nif_incoming& in,
@@ -84,8 +90,19 @@ class Reception {
   [[nodiscard]] Message with_age(Message message, const nif_incoming& in) const;
   /// Of a stream that its sender has begun anew since.
   [[nodiscard]] nif_verdict drop_outdated();
-  /// A message that is larger than this node takes: its sender is told.
+  /// A DATA that is larger than this node takes, and came whole: its sender is told if it waits for
+  /// an ACK, and subscribers count it.
   [[nodiscard]] nif_verdict refuse(const nif_incoming& in, const proto::gimi::MessageView& view);
+  /// The largest message that this node takes, for people.
+  [[nodiscard]] std::string limit_words() const;
+  /// Tells the sender of a DATA that it is too large. `size`: of the DATA, for people.
+  void tell_too_large(const nif_incoming& in, const proto::gimi::MessageHeader& data,
+                      const std::string& size);
+  /// A DATA of a service that this node subscribed does not come into its queues.
+  void miss(const nif_incoming& in, const proto::gimi::MessageHeader& data);
+  /// The answer to a REQUEST that nobody here gets.
+  void answer_fault(const nif_incoming& in, const proto::gimi::MessageHeader& request,
+                    proto::gimi::RequestFault fault);
   void on_ack(const nif_incoming& in, const proto::gimi::MessageView& view);
   void on_error(const nif_incoming& in, const proto::gimi::MessageView& view);
   void on_ping(const nif_incoming& in, const proto::gimi::MessageView& view);

@@ -71,6 +71,8 @@ Outcome<void> SendStream::send(BytesView data, const Order& order) {
   {
     const MutexLock lock(mutex_);
     unwatched = finish(departure, status);
+    if (status == NIF_TOO_LARGE && departure.sequence == refused_sequence_)
+      failure.sentence = "cannot send to " + target() + ": " + refusal_;
   }
   if (unwatched) watch_if_needed();
   if (status == NIF_OK) return {};
@@ -245,6 +247,13 @@ void SendStream::on_lost(std::uint32_t sequence, const Loss& why) {
   const MutexLock lock(mutex_);
   settle_freed(window_.lose(sequence), why);
   if (window_.empty()) forget_doubts();
+}
+
+void SendStream::on_refused(std::uint32_t sequence, const Loss& why) {
+  on_lost(sequence, why);
+  const MutexLock lock(mutex_);
+  refused_sequence_ = sequence;
+  refusal_ = why.words;
 }
 
 void SendStream::forget_doubts() {

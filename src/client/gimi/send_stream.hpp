@@ -83,6 +83,8 @@ class SendStream {
       GIMNET_EXCLUDES(mutex_);
   /// One message is known to be lost.
   void on_lost(std::uint32_t sequence, const Loss& why) GIMNET_EXCLUDES(mutex_);
+  /// As on_lost(); the receiver does not take it. Its send() answers so if it still goes on.
+  void on_refused(std::uint32_t sequence, const Loss& why) GIMNET_EXCLUDES(mutex_);
   /// Messages may be lost, and that is why: ask.
   void on_doubt(const Loss& why) GIMNET_EXCLUDES(mutex_);
   /// Messages that wait are lost, or nobody will ever tell.
@@ -176,6 +178,9 @@ class SendStream {
   /// was sent.
   Loss doubt_ GIMNET_GUARDED_BY(mutex_);
   Loss asked_ GIMNET_GUARDED_BY(mutex_);
+  /// The message that its receiver refused last, and its words.
+  std::uint32_t refused_sequence_ GIMNET_GUARDED_BY(mutex_) = 0;
+  std::string refusal_ GIMNET_GUARDED_BY(mutex_);
   Ending end_ GIMNET_GUARDED_BY(mutex_);
 };
 

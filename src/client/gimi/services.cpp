@@ -196,6 +196,21 @@ void SubscribedService::count_missed(const Position& message) {
   if (changed) inbox_.note_missed();
 }
 
+void SubscribedService::miss(const Position& position) {
+  const MutexLock lock(mutex_);
+  const Stream* stream = find(position);
+  const bool outdated =
+      stream != nullptr && stream->epochs.look(position.epoch) == StreamEpochs::Step::former;
+  if (outdated || subscribers_.empty()) return;
+  bool changed = false;
+  for (const SharedSubscriber& each : subscribers_) {
+    if (!goes_on(position)) each->numbers.begin(position.sequence - 1);
+    changed |= each->numbers.miss(position.sequence);
+  }
+  take(position);
+  if (changed) inbox_.note_missed();
+}
+
 void SubscribedService::take(const Position& message) {
   // The hub gives the newest one again, also behind one that came late.
   const bool late =

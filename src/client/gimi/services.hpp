@@ -125,6 +125,8 @@ class SubscribedService {
   enum class Put : std::uint8_t { kept, unwanted, no_room };
   [[nodiscard]] Put put(const std::optional<Position>& position, Message& message)
       GIMNET_EXCLUDES(mutex_);
+  /// One of its messages is too large for this node: it counts as missed.
+  void miss(const Position& position) GIMNET_EXCLUDES(mutex_);
   void on_place(const ServicePlace& now) GIMNET_EXCLUDES(mutex_);
   /// The hub did not take the subscription again; until on_place().
   void on_refused(Failure refusal) GIMNET_EXCLUDES(mutex_);
@@ -163,7 +165,7 @@ class SubscribedService {
   [[nodiscard]] bool goes_on(const Position& message) const GIMNET_REQUIRES(mutex_) {
     return message.from == last_.from && message.epoch == last_.epoch;
   }
-  /// One of its messages is in a queue.
+  /// One of its messages is in a queue, or will not be.
   void take(const Position& message) GIMNET_REQUIRES(mutex_);
 
   const OwnedServiceName name_;

@@ -161,10 +161,12 @@ void StreamTable::on_ack(const StreamName& name, const proto::gimi::MessageHeade
   if (stream->on_ack(header.sequence, ack)) attend_(true);
 }
 
-void StreamTable::on_refused(const StreamName& name, const proto::gimi::MessageHeader& header,
+bool StreamTable::on_refused(const StreamName& name, const proto::gimi::MessageHeader& header,
                              const Loss& why) {
   const Stream stream = find(name);
-  if (stream != nullptr && stream->epoch() == header.epoch) stream->on_lost(header.sequence, why);
+  if (stream == nullptr || stream->epoch() != header.epoch) return false;
+  stream->on_refused(header.sequence, why);
+  return true;
 }
 
 void StreamTable::on_report(const Report& report) {

@@ -55,9 +55,10 @@ class StreamTable final : public StreamKeeper {
   /// `header`: of the answer. One of another epoch is not for this process and changes nothing.
   void on_ack(const StreamName& name, const proto::gimi::MessageHeader& header,
               const proto::gimi::Ack& ack) GIMNET_EXCLUDES(mutex_);
-  /// The receiver says that it did not take that DATA, and why. `header`: as on_ack().
-  void on_refused(const StreamName& name, const proto::gimi::MessageHeader& header, const Loss& why)
-      GIMNET_EXCLUDES(mutex_);
+  /// The receiver says that it did not take that DATA, and why. `header`: as on_ack(). False: it is
+  /// of no stream.
+  [[nodiscard]] bool on_refused(const StreamName& name, const proto::gimi::MessageHeader& header,
+                                const Loss& why) GIMNET_EXCLUDES(mutex_);
 
   /// The hub's word on a frame of this node that it could not deliver.
   struct Report {

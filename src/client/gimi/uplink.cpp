@@ -77,6 +77,15 @@ Failure failure_of(nif_status status, std::string_view doing) {
   return {status_of(status), std::move(sentence)};
 }
 
+namespace {
+
+/// By which NIF finds a message that is being sent. Epochs are drawn for each stream.
+std::uint64_t tag_of(const proto::gimi::MessageHeader& header) {
+  return (std::uint64_t{header.epoch} << 32) | header.sequence;
+}
+
+}  // namespace
+
 nif_status Uplink::transmit(const Envelope& envelope, proto::gimi::MessageHeader header,
                             bool stamped, BytesView data, std::int32_t timeout_ms) const {
   if (data.size() > GIMI_MESSAGE_BYTES_MAX)
@@ -104,7 +113,7 @@ nif_status Uplink::transmit(const Envelope& envelope, proto::gimi::MessageHeader
   outgoing.trace_slots = envelope.trace_slots;
   nif::Node* const direct = direct_.load();
   if (direct == nullptr) return NIF_CLOSED;
-  return nif::guarded([&] { return direct->send(outgoing, timeout_ms); });
+  return nif::guarded([&] { return direct->send(outgoing, timeout_ms, tag_of(header)); });
 }
 
 void Uplink::open(nif_node* node) {
@@ -114,6 +123,10 @@ void Uplink::open(nif_node* node) {
 
 Uplink::~Uplink() {
   if (nif::Node* const direct = direct_.load()) direct->drop();
+}
+
+void Uplink::give_up(const proto::gimi::MessageHeader& header) const {
+  if (nif::Node* const direct = direct_.load()) direct->outbound().give_up(tag_of(header));
 }
 
 void Uplink::credit(const TakenMessages& taken, bool more) const {

@@ -77,6 +77,9 @@ class Uplink {
   [[nodiscard]] nif_status transmit(const Envelope& envelope, proto::gimi::MessageHeader header,
                                     bool stamped, BytesView data, std::int32_t timeout_ms) const;
 
+  /// The rest of the message with that header does not go any more: its receiver does not take it.
+  void give_up(const proto::gimi::MessageHeader& header) const;
+
   /// As nif_credit() and nif_deliver().
   void credit(const TakenMessages& taken, bool more) const;
   void deliver() const;
