@@ -9,13 +9,15 @@ from typing import Any, Deque, Dict, Iterator, List, Optional, Set, Tuple, Type,
 
 from . import _c, errors, messages
 from .errand import interruptible
-from .handles import Exit, Handle, Raw, Stream, Waitable, in_pieces, sized, to_key, to_ms, to_text
+from .handles import (TIMEOUT_MS_MAX, Exit, Handle, Raw, Stream, Waitable, end_of, in_pieces, left_ms, sized, to_key,
+                      to_ms, to_text)
 from .messages import Event, Message, NodeRecord, Peer, ServiceRecord
 from .requests import Answers, Pending, Reply
 
 __all__ = ["ConnectionEvent", "ConnectionWatch", "Node", "Publisher", "Source", "State", "Watch", "connect"]
 
 _SMALL_BYTES = 1 << 16
+_PIECES_BYTES_MAX = 1 << 20  # any receiver takes the whole of a smaller message before it looks at its size
 
 
 def _peer(to: Peer) -> int:
@@ -276,21 +278,22 @@ class Node(Waitable):
         """Sends to the service of that full name, or to a Peer of find(). `lane`: as of advertise(), and
         the same each time. It does not tell if the message is lost on its way. With `confirm` it waits until the
         receiver has the message in its queue. NotFound, Timeout (not sent, or not confirmed: it may still arrive),
-        NotConnected, NotDelivered (why it is lost, or may be), BadArgument."""
+        NotConnected, NotDelivered (why it is lost, or may be), TooLarge, BadArgument."""
         sender = self._sender(to, lane, timeout)
         data, size, keeps = messages.payload(value)
-        if confirm:
-            ms = to_ms(timeout)
+        if not confirm and size <= _PIECES_BYTES_MAX:
+            status = in_pieces(timeout, lambda ms: _c.lib.gimi_send(sender, data, size, ms, 0))
+            del keeps
+            return self.check(status)
+        ms = to_ms(timeout) if confirm else left_ms(end_of(timeout), TIMEOUT_MS_MAX)
 
-            def call(_: Any = keeps) -> None:
-                """In one piece: a second call would send the message a second time."""
-                self.check(_c.lib.gimi_send_confirmed(sender, data, size, ms))
+        def call(_: Any = keeps) -> None:
+            """In one piece: a second call would send the message a second time. A large one that had begun when
+            its time was over goes on in the library, and nobody would hear that its receiver refused it."""
+            self.check(_c.lib.gimi_send_confirmed(sender, data, size, ms) if confirm else
+                       _c.lib.gimi_send(sender, data, size, ms, 0))
 
-            interruptible(call)
-            return
-        status = in_pieces(timeout, lambda ms: _c.lib.gimi_send(sender, data, size, ms, 0))
-        del keeps
-        self.check(status)
+        interruptible(call)
 
     def _sender(self, to: Union[str, Peer], lane: str, timeout: float) -> int:
         sender = self._senders.get((to, lane))
@@ -380,11 +383,14 @@ class Node(Waitable):
 
 
 def connect(name: str = "", *, hub: str = "", description: str = "", timeout: float = 5.0, wait_for_hub: bool = False,
-            number_if_taken: bool = False) -> Node:
+            number_if_taken: bool = False, message_bytes_max: int = 0) -> Node:
     """Joins the network under that name, or without one. `hub`: `tcp://host:port` or `unix:/path`; "":
-    GIMNET_HUB, else the hub of this machine. `number_if_taken`: else as NAME-2 ... NAME-99. NoHub, NameTaken, BadName, Timeout, ..."""
+    GIMNET_HUB, else the hub of this machine. `number_if_taken`: else as NAME-2 ... NAME-99.
+    `message_bytes_max`: of the largest message that it takes, 0: 64 MiB, at most 1 GiB. NoHub, NameTaken,
+    BadName, Timeout, ..."""
     options = sized(_c.gimi_node_options, name=to_text(name), hub=to_text(hub), description=to_text(description),
-                     timeout_ms=to_ms(timeout), wait_for_hub=wait_for_hub, number_if_taken=number_if_taken)
+                     timeout_ms=to_ms(timeout), wait_for_hub=wait_for_hub, number_if_taken=number_if_taken,
+                     message_bytes_max=message_bytes_max)
     handle = ctypes.c_uint64()
     interruptible(lambda: errors.check(_c.lib.gimi_join(options, handle)), lambda: _close(handle))
     return Node(handle.value)

@@ -49,6 +49,14 @@ class Nodes(TwoNodes):
         self.assertEqual([(view[0], view[-1], view.readonly) for view in kept],
                          [(number, number, True) for number in range(0, 20, 3)])
 
+    def test_a_message_that_is_larger_than_its_receiver_takes_is_refused(self):
+        with gimnet.connect("small", hub=self.hub.url, message_bytes_max=1 << 20) as small:
+            drive = small.accept("drive")
+            with self.assertRaisesRegex(gimnet.TooLarge, "at most 1048576 bytes, and this one is larger"):
+                self.robot.send("small/drive", bytes(48 << 20), timeout=PATIENCE_S)
+            self.robot.send("small/drive", b"small")
+            self.assertEqual(bytes(drive.receive(PATIENCE_S).data), b"small")
+
     def test_silence_is_told_from_the_end(self):
         publisher = self.robot.advertise("pulse", age_max=10.0)
         subscription = self.viewer.subscribe("robot/pulse", silence=0.05)
