@@ -49,7 +49,9 @@ std::string HubLink::title() const {
 void HubLink::begin_connection(const proto::HubIntroduction& said, const LinkTerms& own,
                                milliseconds now) {
   const bool same = peer_ && peer_->hub == said.hub && peer_->instance == said.instance;
+  const bool kept_routes = same && (connected_ || resume_until_);
   if (!same) breaks_.clear();
+  if (!kept_routes) damp(now);
   peer_ = said;
   connected_ = true;
   allow_ = own.allow;
@@ -69,22 +71,22 @@ void HubLink::begin_connection(const proto::HubIntroduction& said, const LinkTer
   over_since_.reset();
   dial_at_.reset();
   backoff_.reset();
+}
+
+void HubLink::damp(milliseconds now) {
   while (!breaks_.empty() && breaks_.front() + kBreaksWithin <= now) breaks_.pop_front();
   damped_until_.reset();
-  if (breaks_.size() > kBreaksMost) {
-    const auto doublings = std::min<std::size_t>(breaks_.size() - kBreaksMost - 1, 4);
-    damped_until_ = now + std::min(milliseconds{1'000 << doublings}, kDampedMost);
-  }
+  if (breaks_.size() <= kBreaksMost) return;
+  const auto doublings = std::min<std::size_t>(breaks_.size() - kBreaksMost - 1, 4);
+  damped_until_ = now + std::min(milliseconds{1'000 << doublings}, kDampedMost);
 }
 
 void HubLink::end_connection(bool at_once, milliseconds now) {
   connected_ = false;
-  damped_until_.reset();
   if (at_once) {
     epoch = 0;
     return;
   }
-  breaks_.push_back(now);
   const auto round_trip = std::chrono::ceil<milliseconds>(clock_.round_trip_least);
   resume_until_ = now + kResumeTime + 4 * round_trip;
 }

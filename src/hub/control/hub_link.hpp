@@ -36,7 +36,8 @@ class HubLink {
   static constexpr std::chrono::milliseconds kResumeTime{300};
   /// A hub that met its own copy, or itself, tries again so often.
   static constexpr std::chrono::milliseconds kCopyPause = std::chrono::seconds(10);
-  /// More breaks than this within kBreaksWithin damp the link.
+  /// More breaks than this within kBreaksWithin damp the link. A connection that is resumed within
+  /// its time to come back is no break: it cost nobody a route.
   static constexpr std::size_t kBreaksMost = 2;
   static constexpr std::chrono::milliseconds kBreaksWithin = std::chrono::minutes(1);
   static constexpr std::chrono::milliseconds kDampedMost = std::chrono::seconds(10);
@@ -85,10 +86,16 @@ class HubLink {
   [[nodiscard]] std::optional<std::chrono::milliseconds> resume_until() const {
     return resume_until_;
   }
-  /// Its time to come back is over.
-  void give_up() { resume_until_.reset(); }
+  /// Its routes are withdrawn.
+  void give_up() {
+    resume_until_.reset();
+    damped_until_.reset();
+  }
+  /// Its time to come back is over. REQUIRES: resume_until(); give_up() follows.
+  void note_break(std::chrono::milliseconds now) { breaks_.push_back(now); }
   [[nodiscard]] std::uint32_t silent_ms() const { return silent_ms_; }
   [[nodiscard]] std::uint32_t keep_alive_ms() const { return keep_alive_ms_; }
+  /// Until then others are told the highest cost, since it broke too often. Nothing: the true one.
   [[nodiscard]] std::optional<std::chrono::milliseconds> damped_until() const {
     return damped_until_;
   }
@@ -160,6 +167,8 @@ class HubLink {
   void compare_clocks(ClockSample sample);
   /// True: it was another one. 0: measured.
   bool follow_cost(std::uint16_t configured);
+  /// Looks whether it broke too often, as it comes back after its routes were withdrawn.
+  void damp(std::chrono::milliseconds now);
 
   const LinkNumber number_;
   const std::string name_;
@@ -184,8 +193,8 @@ class HubLink {
   std::optional<std::chrono::milliseconds> dial_at_;
   std::optional<std::chrono::milliseconds> damped_until_;
   std::optional<std::chrono::milliseconds> over_since_;
-  /// Under the same instance, within kBreaksWithin. Limit: the breaks of a minute, at least 50 ms
-  /// apart.
+  /// Under the same instance, within kBreaksWithin. Limit: the breaks of a minute, at least
+  /// kResumeTime apart.
   std::deque<std::chrono::milliseconds> breaks_;
   net::DialBackoff backoff_;
 };

@@ -246,7 +246,10 @@ void Links::close(const HubLink& link, GoodbyeCode code, std::string sentence) {
 
 void Links::tick(Moment moment) {
   for (const auto& [number, link] : links_.all()) {
-    if (link->resume_until() && *link->resume_until() <= moment.now) withdraw(*link);
+    if (link->resume_until() && *link->resume_until() <= moment.now) {
+      link->note_break(moment.now);
+      withdraw(*link);
+    }
     if (link->damped_until() && *link->damped_until() <= moment.now) {
       link->end_damping();
       network_.set_damped(number, false);

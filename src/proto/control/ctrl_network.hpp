@@ -79,7 +79,7 @@ enum class LinkState : std::uint16_t {
   away = 1,      ///< the connection broke, and may be resumed
   learning = 2,  ///< connected; the records of the other side have not come, or no route is known
   standby = 3,   ///< up, while another link to the same hub carries
-  damped = 4,    ///< up, and not reported yet, since it broke too often
+  damped = 4,    ///< up at the highest cost, since it broke too often
   up = 5,
   ended = 6,  ///< the other side dialled it, and does so no more
 };

@@ -18,11 +18,18 @@ proto::HubIntroduction introduction(std::uint64_t instance = 1) {
   return said;
 }
 
-/// Begins a connection and breaks it, so many times.
+/// It breaks and does not come back in time.
+void break_once(HubLink& link, milliseconds now) {
+  link.end_connection(false, now);
+  link.note_break(now);
+  link.give_up();
+}
+
+/// Begins a connection and breaks it, so many times; it does not come back in time.
 void break_often(HubLink& link, int times, milliseconds now, std::uint64_t instance = 1) {
   for (int i = 0; i < times; ++i) {
     link.begin_connection(introduction(instance), {}, now);
-    link.end_connection(false, now);
+    break_once(link, now);
   }
 }
 
@@ -131,18 +138,40 @@ TEST(HubLink, IsDampedFromTheThirdBreakOn) {
   break_often(link, 2, now);
   link.begin_connection(introduction(), {}, now);
   EXPECT_FALSE(link.damped_until());
-  link.end_connection(false, now);
+  break_once(link, now);
   link.begin_connection(introduction(), {}, now);
   EXPECT_EQ(link.damped_until(), now + milliseconds{1'000});
-  link.end_connection(false, now);
+  break_once(link, now);
+  EXPECT_FALSE(link.damped_until()) << "nobody is told of it";
   link.begin_connection(introduction(), {}, now);
   EXPECT_EQ(link.damped_until(), now + milliseconds{2'000});
   break_often(link, 20, now);
   link.begin_connection(introduction(), {}, now);
   EXPECT_EQ(link.damped_until(), now + HubLink::kDampedMost);
-  link.end_connection(false, now);
+  break_once(link, now);
   link.begin_connection(introduction(), {}, now + HubLink::kBreaksWithin);
   EXPECT_FALSE(link.damped_until()) << "a minute without a break";
+}
+
+TEST(HubLink, ABreakThatIsResumedNeitherDampsNorUndamps) {
+  HubLink link(LinkNumber{1}, "up");
+  const milliseconds now{100'000};
+  for (int i = 0; i < 20; ++i) {
+    link.begin_connection(introduction(), {}, now);
+    link.end_connection(false, now);
+  }
+  link.begin_connection(introduction(), {}, now);
+  EXPECT_FALSE(link.damped_until());
+  break_once(link, now);
+  break_often(link, 2, now);
+  link.begin_connection(introduction(), {}, now);
+  ASSERT_EQ(link.damped_until(), now + milliseconds{1'000});
+  link.end_connection(false, now + milliseconds{900});
+  EXPECT_TRUE(link.damped_until());
+  link.begin_connection(introduction(), {}, now + milliseconds{950});
+  EXPECT_EQ(link.damped_until(), now + milliseconds{1'000});
+  link.begin_connection(introduction(), {}, now + milliseconds{960});
+  EXPECT_EQ(link.damped_until(), now + milliseconds{1'000}) << "it came back before it was missed";
 }
 
 TEST(HubLink, ARestartOfTheOtherHubIsNoBreakOfTheLink) {

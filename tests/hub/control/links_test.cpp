@@ -34,61 +34,6 @@ TEST(Links, TheSideThatDialledBegins) {
   EXPECT_FALSE(hubs.b.take_frames().empty());
 }
 
-TEST(Links, ABrokenLinkKeepsItsRoutesForItsTimeToComeBack) {
-  LinkedRigs hubs;
-  hubs.link();
-  hubs.a.detach(hubs.a.attached());
-  hubs.a.pass(HubLink::kResumeTime - milliseconds{1});
-  EXPECT_TRUE(hubs.a.routes.find(kB).exists());
-  EXPECT_TRUE(hubs.a.shards.all<ReleaseCommand>().empty());
-  hubs.a.pass(milliseconds{1});
-  EXPECT_FALSE(hubs.a.routes.find(kB).exists());
-  EXPECT_EQ(hubs.a.shards.all<ReleaseCommand>().size(), 1u) << "what waits for it is lost";
-}
-
-TEST(Links, AGoodbyeWithdrawsALinkAtOnce) {
-  LinkedRigs hubs;
-  hubs.link();
-  hubs.a.detach(hubs.a.attached(), GoodbyeCode::draining, true);
-  EXPECT_FALSE(hubs.a.routes.find(kB).exists());
-}
-
-TEST(Links, ALinkThatComesBackSaysWhatItHadTaken) {
-  LinkedRigs hubs;
-  hubs.link();
-  const AttachCommand& before = hubs.b.attached();
-  const SessionRef session = before.session;
-  hubs.b.detach(before);
-  hubs.a.detach(hubs.a.attached());
-  hubs.b.pass(milliseconds{50});  // at most that long after a first break
-  hubs.connect(true);
-  const proto::Hello& hello = hubs.b.dialled.back().hello;
-  EXPECT_EQ(hello.epoch, 11u);
-  EXPECT_EQ(hello.resume_epoch, 12u);
-  EXPECT_EQ(hello.resume_taken, 5u);
-  EXPECT_TRUE(hubs.b.attached().link->resumed);
-  EXPECT_EQ(hubs.b.attached().session.generation, session.generation);
-  EXPECT_EQ(hubs.b.attached().attachment, 2u);
-  EXPECT_TRUE(hubs.b.routes.find(kA).exists()) << "frames wait meanwhile";
-}
-
-TEST(Links, OneThatCameBackTooLateBeginsAnewAtBothEnds) {
-  LinkedRigs hubs;
-  hubs.link();
-  hubs.b.detach(hubs.b.attached());
-  hubs.b.pass(milliseconds{50});
-  const LinkRig::Dialled late = hubs.b.dialled.back();
-  hubs.b.pass(HubLink::kResumeTime);
-  proto::Welcome welcome = hubs.a.attached().welcome;
-  welcome.resumed = true;
-  const std::size_t attached = hubs.b.shards.all<AttachCommand>().size();
-  hubs.b.links.on_dialled(late.link, net::Welcomed{std::make_unique<NoStream>(), welcome},
-                          hubs.b.moment());
-  EXPECT_EQ(hubs.b.shards.all<AttachCommand>().size(), attached) << "the other end counts on";
-  hubs.b.pass(milliseconds{1'000});
-  EXPECT_EQ(hubs.b.dialled.back().hello.resume_epoch, 0u);
-}
-
 TEST(Links, OnlyAHubThatSaysSoTakesThem) {
   LinkRig hub(1, {});
   proto::Hello hello;

@@ -129,10 +129,11 @@ void World::cut_for(std::size_t wire, bool there, bool back, std::uint64_t ms) {
 }
 
 /// Both ends are told, or one.
-void World::reset(std::size_t wire) {
+void World::reset(std::size_t wire) { reset(wire, random_.between(1, 3)); }
+
+void World::reset(std::size_t wire, std::uint64_t ends) {
   census_.note(Event::reset);
   note("wire " + std::to_string(wire) + " is reset");
-  const std::uint64_t ends = random_.between(1, 3);
   for (const auto& line : lines_) {
     if (line->wire != wire || line->stream != nullptr || line->dead) continue;
     line->dead = true;

@@ -49,7 +49,7 @@ bool Settled::has_edge(std::size_t one, std::size_t other) const {
   const auto stands = [](const SimHub& at, const SimHub& to) {
     return std::ranges::any_of(at.links().all(), [&](const auto& each) {
       const hub::HubLink& link = *each.second;
-      return link.connected() && at.links().network().is_up(each.first) && !link.damped_until() &&
+      return link.connected() && at.links().network().is_up(each.first) &&
              link.peer()->instance == to.facts().instance;
     });
   };

@@ -15,6 +15,14 @@ void Stage::run_until_up(std::size_t wire) {
   need(is_up(0) && is_up(1), Checker::joined, "the link does not come up");
 }
 
+bool Stage::is_damped(std::size_t wire) const {
+  const auto damped = [&](std::size_t end) {
+    const hub::HubLink* const link = world_.find_link(wire, end);
+    return link != nullptr && link->damped_until().has_value();
+  };
+  return damped(0) || damped(1);
+}
+
 void Stage::spoil_next(std::size_t wire) {
   for (const auto& line : world_.lines_)
     if (line->wire == wire) line->flows[0].spoil_next();

@@ -22,6 +22,7 @@ class Stage {
   }
   void mend(std::size_t wire) { world_.wires_[wire].cut = {}; }
   void reset(std::size_t wire) { world_.reset(wire); }
+  void reset_at_both_ends(std::size_t wire) { world_.reset(wire, 3); }
   /// A reserved flag is set in the next UNICAST from the dialler.
   void spoil_next(std::size_t wire);
   void set_cost(std::size_t wire, std::uint16_t cost);
@@ -53,6 +54,8 @@ class Stage {
   [[nodiscard]] std::uint64_t line_of(std::size_t wire) const {
     return world_.wires_[wire].counted[0].line;
   }
+  /// One of its ends took it to break too often.
+  [[nodiscard]] bool is_damped(std::size_t wire) const;
   /// That crossed it so far, both ways.
   [[nodiscard]] std::uint64_t frames_of(std::size_t wire) const {
     return world_.wires_[wire].frames;

@@ -85,6 +85,43 @@ void play_other_way_after_silence(Stage& stage) {
   stage.mend(0);
 }
 
+// A link that breaks often
+
+/// A connection breaks each second, and is back within 50 ms: what was resumed costs nobody a
+/// route.
+void play_break_each_second(Stage& stage) {
+  stage.run(kStartMs);
+  for (int i = 0; i < 20; ++i) {
+    stage.reset_at_both_ends(0);
+    stage.flood(1'000, 100, [](std::size_t from) { return 1 - from; });
+    Stage::need(!stage.is_damped(0), Checker::joined, "a link that was resumed is damped");
+  }
+  stage.all_arrive(1'000);
+  Stage::need(!stage.node(0).first_report(proto::DropReason::no_route), Checker::reachable,
+              "frames found no way over a link that was resumed");
+}
+
+/// Its routes went so often that it is damped: it carries, since no other way leads there.
+void play_damped(Stage& stage) {
+  constexpr std::uint64_t kComesUpWithinMs = 100;
+  stage.run(kStartMs);
+  for (int i = 0; i < 5; ++i) {
+    stage.cut(0);
+    stage.run(2'000);
+    stage.mend(0);
+    stage.run_until_up(0);
+  }
+  stage.run(kComesUpWithinMs);
+  Stage::need(stage.is_damped(0), Checker::joined, "a link that broke five times is not damped");
+  const std::uint64_t arrived = stage.arrived();
+  const std::uint64_t sent = stage.sent();
+  stage.flood(500, 100, [](std::size_t from) { return 1 - from; });
+  stage.run(kOnItsWayMs);
+  Stage::need(stage.is_damped(0), Checker::joined, "a link is not damped for long");
+  Stage::need(stage.arrived() - arrived == stage.sent() - sent, Checker::reachable,
+              "a damped link does not carry what has no other way");
+}
+
 // Links of which nobody wants anything
 
 void play_idle(Stage& stage) {
@@ -167,6 +204,8 @@ constexpr Scene kTimed[] = {
     {"no_route_after_a_silent_link", [] { return chain(2); }, play_silent_link},
     {"other_way_after_a_closed_link", [] { return ring(4); }, play_other_way_after_close},
     {"other_way_after_a_silent_link", [] { return ring(4); }, play_other_way_after_silence},
+    {"link_breaks_each_second", [] { return chain(2); }, play_break_each_second},
+    {"damped_link_carries", [] { return chain(2); }, play_damped},
     {"three_idle_hubs", [] { return ring(3); }, play_idle},
     {"pictures_of_a_slow_link", [] { return chain(2, kPictureDelayMs, kPictureRate); },
      play_pictures},

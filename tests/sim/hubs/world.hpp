@@ -104,6 +104,8 @@ class World {
   void fault_of_a_machine(std::uint64_t kind);
   void cut_for(std::size_t wire, bool there, bool back, std::uint64_t ms);
   void reset(std::size_t wire);
+  /// ends: a bit for each that is told.
+  void reset(std::size_t wire, std::uint64_t ends);
   void partition();
   void heal();
 

@@ -5,8 +5,8 @@
 namespace gimnet::sim::routes {
 namespace {
 
-constexpr std::uint64_t kKinds = 10;
-constexpr std::uint64_t kFirstKindOfHubs = 7;
+constexpr std::uint64_t kKinds = 11;
+constexpr std::uint64_t kFirstKindOfHubs = 8;
 constexpr std::uint64_t kOutageMost = 4'000;
 
 }  // namespace
@@ -65,10 +65,24 @@ void World::fault_of_a_wire(std::uint64_t kind) {
       open(wire, 0, last_number_);
       if (each.ends[1].open && each.ends[0].open) open(wire, 1, last_number_);
       break;
+    case 6:  // one end says the highest cost, for a while or for good
+      census_.note(Event::damped);
+      damp(end, wire, true);
+      if (random_.chance(500)) {
+        after_ms(outage, [this, wire, &end] { damp(end, wire, false); });
+      }
+      break;
     default:
       partition();
       break;
   }
+}
+
+void World::damp(End& end, std::size_t wire, bool damped) {
+  end.damped = damped;
+  if (!end.open) return;
+  hubs_[end.hub].state->set_damped(hub::LinkNumber{static_cast<std::uint32_t>(wire + 1)}, damped);
+  turn(end.hub);
 }
 
 void World::fault_of_a_hub(std::uint64_t kind) {

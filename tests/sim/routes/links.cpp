@@ -75,6 +75,7 @@ void World::open(std::size_t wire, int end, std::uint64_t connection) {
   hub::LinkFacts facts{identity(other), each.plan.name, end == 0,
                        each.plan.costs[static_cast<std::size_t>(end)]};
   hubs_[mine.hub].state->begin_connection(number_of(wire), std::move(facts), now());
+  hubs_[mine.hub].state->set_damped(number_of(wire), mine.damped);
   hubs_[mine.hub].names->begin_connection(number_of(wire), now());
   turn(mine.hub);
 }

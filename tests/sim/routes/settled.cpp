@@ -113,7 +113,9 @@ void Settled::find_shortest() {
     if (!stands(wire)) continue;
     for (const std::size_t end : {std::size_t{0}, std::size_t{1}}) {
       auto& cost = said[wire.ends[end].hub][wire.ends[1 - end].hub];
-      cost = std::min<std::uint64_t>(cost, wire.plan.costs[end]);
+      const std::uint64_t said_cost =
+          wire.ends[end].damped ? hub::LinkCost::kMost : wire.plan.costs[end];
+      cost = std::min(cost, said_cost);
     }
   }
   for (std::size_t a = 0; a < hubs; ++a) {

@@ -70,6 +70,7 @@ struct End {
   std::uint64_t connection = 0;  ///< the present one of this end
   milliseconds last_arrival{0};  ///< messages towards this end come in order
   bool lose_next = false;        ///< a record towards this end gets lost unseen
+  bool damped = false;           ///< it says the highest cost
   int names = 0;                 ///< NAMES under way towards this end
   std::uint64_t names_connection = 0;
 };
@@ -145,6 +146,7 @@ class World {
   void fault();
   void fault_of_a_wire(std::uint64_t kind);
   void fault_of_a_hub(std::uint64_t kind);
+  void damp(End& end, std::size_t wire, bool damped);
   void partition();
   void heal();
 

@@ -4,7 +4,6 @@
 #include <tuple>
 
 #include "base/check.hpp"
-#include "hub/network/state/link_cost.hpp"
 
 namespace gimnet::hub {
 namespace {
@@ -253,24 +252,24 @@ void NetworkState::flood(const PartRef& part, LinkNumber except) {
   }
 }
 
-bool NetworkState::carries_rather(const LinkFacts& link, const LinkFacts& than) const {
-  const auto rank = [this](const LinkFacts& facts) {
-    const auto& dialler = facts.dialled ? own_.identity().key : facts.peer.key;
-    return std::tie(facts.cost, dialler, facts.name);
+bool NetworkState::carries_rather(const Link& link, const Link& than) const {
+  using Rank = std::tuple<std::uint16_t, const proto::HubKey&, const std::string&>;
+  const auto rank = [this](const Link& each) {
+    const auto& dialler = each.facts.dialled ? own_.identity().key : each.facts.peer.key;
+    return Rank(each.cost(), dialler, each.facts.name);
   };
   return rank(link) < rank(than);
 }
 
 std::vector<CarryingLink> NetworkState::carrying_links() const {
-  std::map<proto::HubKey, std::pair<LinkNumber, const LinkFacts*>> best;
+  std::map<proto::HubKey, std::pair<LinkNumber, const Link*>> best;
   for (const auto& [number, link] : links_) {
-    if (!link.has_mark || link.damped) continue;
-    const auto [found, is_new] = best.try_emplace(link.facts.peer.key, number, &link.facts);
-    if (!is_new && carries_rather(link.facts, *found->second.second))
-      found->second = {number, &link.facts};
+    if (!link.has_mark) continue;
+    const auto [found, is_new] = best.try_emplace(link.facts.peer.key, number, &link);
+    if (!is_new && carries_rather(link, *found->second.second)) found->second = {number, &link};
   }
   std::vector<CarryingLink> carrying;
-  for (const auto& [hub, link] : best) carrying.push_back({{hub, link.second->cost}, link.first});
+  for (const auto& [hub, link] : best) carrying.push_back({{hub, link.second->cost()}, link.first});
   return carrying;
 }
 

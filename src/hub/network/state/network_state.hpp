@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "hub/network/state/link_cost.hpp"
 #include "hub/network/state/network_map.hpp"
 #include "hub/network/state/own_record.hpp"
 #include "hub/network/state/record_store.hpp"
@@ -153,7 +154,8 @@ class NetworkState {
   /// The digest in a keep-alive came.
   void take_digest(LinkNumber number, std::uint64_t digest, std::chrono::milliseconds now);
   void set_cost(LinkNumber number, std::uint16_t cost);
-  /// A damped link carries records and is not reported.
+  /// A damped link broke too often: this hub says that it costs as much as it can, and computes its
+  /// own ways by that, too. So it carries what has no other way, and all hubs have one map.
   void set_damped(LinkNumber number, bool damped);
   /// The map goes without it at once.
   void end_link(LinkNumber number);
@@ -200,6 +202,7 @@ class NetworkState {
     LinkFacts facts;
     bool has_mark = false;
     bool damped = false;
+    [[nodiscard]] std::uint16_t cost() const { return damped ? LinkCost::kMost : facts.cost; }
     std::optional<std::chrono::milliseconds> differs_since;
     std::chrono::milliseconds repair_pause = kRepairPauses.first;
     PartPace pace;
@@ -211,7 +214,7 @@ class NetworkState {
   void note_links();
   void send(LinkNumber link, const PartRef& part);
   void flood(const PartRef& part, LinkNumber except);
-  [[nodiscard]] bool carries_rather(const LinkFacts& link, const LinkFacts& than) const;
+  [[nodiscard]] bool carries_rather(const Link& link, const Link& than) const;
   /// One link for each neighbour that counts; ascending by neighbour.
   [[nodiscard]] std::vector<CarryingLink> carrying_links() const;
 

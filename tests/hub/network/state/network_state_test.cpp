@@ -2,72 +2,12 @@
 
 #include <gtest/gtest.h>
 
-#include <set>
-
-#include "tests/hub/network/state/support/hubs.hpp"
+#include "tests/hub/network/state/support/hub_with_two_links.hpp"
 
 namespace gimnet::hub {
 namespace {
 
 using namespace test;
-using std::chrono::seconds;
-
-constexpr milliseconds kNow{1'000};
-constexpr LinkNumber kFirst{1};
-constexpr LinkNumber kSecond{2};
-
-LinkFacts to(const HubIdentity& peer, std::uint16_t cost = 10) { return {peer, "url", true, cost}; }
-
-proto::Payload bytes(const HubIdentity& hub, std::uint64_t sequence,
-                     const std::vector<std::pair<proto::HubKey, std::uint16_t>>& neighbours = {}) {
-  return part(hub, sequence, neighbours)->bytes;
-}
-
-/// Everything that goes out: link and the hub of the record, "mark" as hub id 0.
-std::multiset<std::pair<std::uint32_t, std::uint16_t>> sent(NetworkState& hub) {
-  std::multiset<std::pair<std::uint32_t, std::uint16_t>> found;
-  for (const Sending& each : hub.take_sendings()) {
-    const PartRef record = read_part(*each.bytes);
-    found.emplace(each.link.value(), record == nullptr ? 0 : record->said.hub.hub.value());
-  }
-  return found;
-}
-using Sent = std::multiset<std::pair<std::uint32_t, std::uint16_t>>;
-
-/// Hub 5 with links to the hubs 2 and 3, which report it too.
-class HubWithTwoLinks : public testing::Test {
- protected:
-  HubWithTwoLinks() {
-    hub_.begin_connection(kFirst, to(two_), kNow);
-    hub_.begin_connection(kSecond, to(three_), kNow);
-    hub_.take_record(kFirst, bytes(two_, 1, {{hub_key(5), 10}}), kNow);
-    hub_.take_record(kSecond, bytes(three_, 1, {{hub_key(5), 10}}), kNow);
-    hub_.take_mark(kFirst);
-    hub_.take_mark(kSecond);
-    hub_.advance(kNow);
-    hub_.advance(kNow + seconds(5));
-    (void)hub_.take_sendings();
-  }
-
-  /// A copy of this hub's state folder goes on behind it, and does so again when this hub goes on.
-  void name_this_hub(const HubIdentity& as) {
-    for (const std::uint64_t sequence : {90u, 92u}) {
-      auto copy = said(as, sequence);
-      copy.behind = proto::HubInstance{55};
-      (void)hub_.take_sendings();
-      hub_.take_record(kFirst, make_part(copy)->bytes, later_);
-      if (sequence == 92) break;
-      EXPECT_EQ(hub_.verdict(), Verdict::stay);
-      hub_.advance(later_);
-      later_ += seconds(2);
-    }
-  }
-
-  const HubIdentity two_ = identity(2, 22);
-  const HubIdentity three_ = identity(3, 33);
-  NetworkState hub_{identity(5, 55), {"lab", "1.0"}};
-  milliseconds later_ = kNow + seconds(10);
-};
 
 TEST(NetworkStateExchange, SendsAllRecordsThenTheMark) {
   NetworkState hub(identity(5, 55), {});
@@ -148,14 +88,32 @@ TEST_F(HubWithTwoLinks, KeepsTheRouteOverABreakWithResume) {
   EXPECT_EQ(hub_.map().next_hops()[2], LinkNumber{}) << "another process";
 }
 
-TEST_F(HubWithTwoLinks, DoesNotReportADampedLink) {
+TEST_F(HubWithTwoLinks, SaysTheHighestCostOfADampedLink) {
+  const auto cost_said = [this] {
+    return hub_.store().find(hub_.self().key)->head()->neighbours[0].cost;
+  };
   hub_.set_damped(kFirst, true);
   hub_.advance(later_);
-  EXPECT_EQ(hub_.map().next_hops()[2], LinkNumber{});
-  EXPECT_EQ(sent(hub_).count({1, 5}), 1u) << "records cross it, too";
+  EXPECT_EQ(cost_said(), LinkCost::kMost);
+  EXPECT_EQ(sent(hub_), (Sent{{1, 5}, {2, 5}}));
+  EXPECT_EQ(hub_.map().next_hops()[2], kFirst) << "it carries what has no other way";
+  EXPECT_EQ(hub_.map().ways()[0].cost, LinkCost::kMost) << "its own map is that of the others";
   hub_.set_damped(kFirst, false);
   hub_.advance(later_ + seconds(1));
-  EXPECT_EQ(hub_.map().next_hops()[2], kFirst);
+  EXPECT_EQ(cost_said(), 10u);
+  EXPECT_EQ(hub_.map().ways()[0].cost, 10u);
+}
+
+TEST_F(HubWithTwoLinks, LetsADampedLinkWaitBesideAnotherOne) {
+  constexpr LinkNumber kThird{3};
+  hub_.begin_connection(kThird, to(two_, 900), later_);
+  hub_.take_mark(kThird);
+  hub_.set_damped(kFirst, true);
+  hub_.advance(later_);
+  EXPECT_EQ(hub_.map().next_hops()[2], kThird);
+  hub_.set_damped(kThird, true);
+  hub_.advance(later_ + seconds(1));
+  EXPECT_EQ(hub_.map().next_hops()[2], kFirst) << "of equal cost and name the first one";
 }
 
 TEST_F(HubWithTwoLinks, UsesTheCheaperOfTwoLinksThenTheOneOfTheLowerDiallerThenTheName) {
@@ -339,51 +297,6 @@ TEST_F(HubWithTwoLinks, StaysWhereTheCopyHasTheHigherInstance) {
   EXPECT_EQ(hub_.verdict(), Verdict::stay);
   hub_.advance(later_);
   EXPECT_EQ(sent(hub_), (Sent{{1, 5}, {2, 5}})) << "it goes on behind it";
-}
-
-TEST_F(HubWithTwoLinks, AdmitsANewcomer) {
-  EXPECT_EQ(hub_.admit(identity(7, 77)).admission, LinkAdmission::accept);
-  EXPECT_EQ(hub_.admit(two_).admission, LinkAdmission::accept) << "a second link";
-}
-
-TEST_F(HubWithTwoLinks, RefusesItselfAndCopies) {
-  EXPECT_EQ(hub_.admit(identity(9, 55)).admission, LinkAdmission::is_self);
-  EXPECT_EQ(hub_.admit(identity(5, 56)).admission, LinkAdmission::is_copy);
-  const auto answer = hub_.admit(identity(2, 23));
-  EXPECT_EQ(answer.admission, LinkAdmission::ask_old_link);
-  EXPECT_EQ(answer.old_link, kFirst);
-  const auto far = identity(8, 88);
-  hub_.take_record(kFirst, bytes(far, 1, {{hub_key(2), 10}}), later_);
-  hub_.take_record(kFirst, bytes(two_, 2, {{hub_key(5), 10}, {far.key, 10}}), later_);
-  hub_.advance(later_);
-  EXPECT_EQ(hub_.map().next_hops()[8], kFirst);
-  EXPECT_EQ(hub_.admit(identity(8, 89)).admission, LinkAdmission::is_copy);
-  EXPECT_EQ(hub_.admit(identity(8, 89)).holder, far.key);
-  hub_.end_link(kFirst);
-  hub_.advance(later_ + seconds(1));
-  EXPECT_EQ(hub_.admit(identity(8, 89)).admission, LinkAdmission::accept)
-      << "out of reach: a restart";
-}
-
-TEST_F(HubWithTwoLinks, RefusesAnIdThatAnotherHubKeeps) {
-  const HubIdentity worse{hub_key(3, 99), proto::HubInstance{9}, true};
-  EXPECT_EQ(hub_.admit(worse).admission, LinkAdmission::id_taken);
-  EXPECT_EQ(hub_.admit(worse).holder, three_.key);
-  const HubIdentity better{{HubId{3}, {}}, proto::HubInstance{9}, true};
-  EXPECT_EQ(hub_.admit(better).admission, LinkAdmission::accept) << "hub 3 will see it, and leave";
-  const HubIdentity own{hub_key(5, 99), proto::HubInstance{9}, true};
-  EXPECT_EQ(hub_.admit(own).admission, LinkAdmission::id_taken);
-  EXPECT_EQ(hub_.admit(own).holder, hub_.self().key);
-}
-
-TEST(NetworkStateAdmission, DrawsAgainForAConfiguredNewcomer) {
-  const NetworkState drawn({hub_key(1'500, 9), proto::HubInstance{55}, false}, {});
-  const HubIdentity configured{hub_key(1'500, 99), proto::HubInstance{9}, true};
-  EXPECT_EQ(drawn.admit(configured).admission, LinkAdmission::draw_again);
-  const HubIdentity drawn_too{hub_key(1'500, 99), proto::HubInstance{9}, false};
-  EXPECT_EQ(drawn.admit(drawn_too).admission, LinkAdmission::id_taken);
-  const HubIdentity lower{hub_key(1'500, 8), proto::HubInstance{9}, false};
-  EXPECT_EQ(drawn.admit(lower).admission, LinkAdmission::id_taken) << "nobody has verified it";
 }
 
 TEST(NetworkStateDraw, AvoidsIdsThatAreKnown) {
