@@ -91,6 +91,18 @@ void HubLink::end_connection(bool at_once, milliseconds now) {
   resume_until_ = now + kResumeTime + 4 * round_trip;
 }
 
+void HubLink::log_linked() const {
+  log_line(LogLevel::info, {"link", name_},
+           std::string{attachment > 1 ? "linked again " : "linked "} +
+               (is_dialled() ? "to " : "by ") + title() + ", " + address + ", link " + name_);
+}
+
+/// Later on the same code says that the other hub has lost its own id.
+bool HubLink::is_refused_id(const DetachedEvent& event) const {
+  return !is_dialled() && !exchange_begun && event.said_by_peer &&
+         event.code == proto::GoodbyeCode::id_taken;
+}
+
 bool HubLink::note_detached(const DetachedEvent& event) {
   epoch = event.epoch;
   peer_epoch = event.peer_epoch;

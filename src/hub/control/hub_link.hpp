@@ -72,9 +72,13 @@ class HubLink {
                         std::chrono::milliseconds now);
   /// The connection broke. `at_once`: one end said GOODBYE, and nothing is resumed.
   void end_connection(bool at_once, std::chrono::milliseconds now);
+  /// The log says that it is linked. REQUIRES: peer().
+  void log_linked() const;
   /// Keeps what `event` tells of the connection that ended, and says in the log why it did. True:
   /// nobody meant to end it, and it may be resumed.
   [[nodiscard]] bool note_detached(const DetachedEvent& event);
+  /// The side that dialled refused this hub, whose id another one has in its network.
+  [[nodiscard]] bool is_refused_id(const DetachedEvent& event) const;
   /// The log says that more records come over it than there is room for. REQUIRES: peer().
   void warn_of_crowding() const;
   [[nodiscard]] bool connected() const { return connected_; }

@@ -148,10 +148,7 @@ void Links::attach(HubLink& link, AttachCommand command, const proto::HubIntrodu
   command.link->silent_ms = link.silent_ms();
   if (link.told_ahead()) command.link->clock_ahead_ns = link.told_ahead()->count();
   wiring_.shards.send(link.place->shard, std::move(command));
-  log_line(LogLevel::info, {"link", link.name()},
-           std::string{link.attachment > 1 ? "linked again " : "linked "} +
-               (link.is_dialled() ? "to " : "by ") + link.title() + ", " + link.address +
-               ", link " + link.name());
+  link.log_linked();
 }
 
 /// The side that dialled begins: what a refused attempt costs is a HELLO.
@@ -201,6 +198,7 @@ void Links::on_route(const SessionRef& session, std::uint32_t attachment,
 void Links::on_detached(const DetachedEvent& event, Moment moment) {
   HubLink* link = links_.find(event.session);
   if (link == nullptr || !link->connected() || link->attachment != event.attachment) return;
+  if (link->is_refused_id(event) && may_give_way(moment.now)) draw_again();
   if (link->removed) {
     log_line(LogLevel::info, {"link", link->name()},
              "link " + link->name() + " to " + link->title() + ": removed by an administrator");

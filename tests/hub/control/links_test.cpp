@@ -76,6 +76,28 @@ TEST(Links, AnIdThatNobodyConfiguredIsDrawnAnewIfItIsTaken) {
   EXPECT_FALSE(redrawn_when_taken(true));
 }
 
+/// A hub whose link that another one dialled ends by GOODBYE id_taken.
+std::optional<HubId> redrawn_when_refused(bool configured, bool begun, bool redrawn) {
+  LinkRig hub(1, LinkRig::accepting(), 0, configured);
+  LinkRig dialler(2, LinkRig::dialling());
+  hub.facts.redrawn = redrawn;
+  hub.facts.started = hub.now;
+  dialler.links.tick(dialler.moment());
+  EXPECT_FALSE(hub.admit(dialler.dialled.back().hello));
+  const AttachCommand& at = hub.attached();
+  const auto mark = proto::encode(proto::route::RecordsEnd{});
+  if (begun) hub.links.on_route(at.session, at.attachment, mark, hub.moment());
+  hub.detach(at, GoodbyeCode::id_taken, true);
+  return hub.links.redrawn();
+}
+
+TEST(Links, AHubThatIsDialledDrawsAnewIfItsIdIsTakenThere) {
+  EXPECT_TRUE(redrawn_when_refused(false, false, false));
+  EXPECT_FALSE(redrawn_when_refused(true, false, false)) << "somebody configured it";
+  EXPECT_FALSE(redrawn_when_refused(false, true, false)) << "the other hub has lost its own id";
+  EXPECT_FALSE(redrawn_when_refused(false, false, true)) << "once a minute";
+}
+
 TEST(Links, ADrawnIdGivesWayToAConfiguredOneOnceAMinute) {
   for (const bool redrawn : {false, true}) {
     LinkRig hub(1'500, LinkRig::accepting(), 0, false);

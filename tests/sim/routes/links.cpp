@@ -40,7 +40,7 @@ void World::dial(std::size_t wire) {
   const auto [dialler, acceptor] = std::pair(each.ends[0].hub, each.ends[1].hub);
   if (!each.wanted || each.cut || each.ends[0].open || now() < each.dial_not_before) return;
   if (!takes_part(dialler) || !takes_part(acceptor)) return;
-  const auto answer = hubs_[acceptor].state->admit(identity(dialler));
+  const auto answer = admit(acceptor, dialler);
   if (answer.admission != hub::LinkAdmission::accept) {
     refuse(wire, 1, answer);
     return;
@@ -51,13 +51,26 @@ void World::dial(std::size_t wire) {
            });
 }
 
+/// A hub that has an id in the network keeps it, whatever a newcomer says of itself.
+hub::LinkAdmissionAnswer World::admit(std::size_t at, std::size_t newcomer) {
+  const hub::NetworkState& state = *hubs_[at].state;
+  const hub::HubIdentity said = identity(newcomer);
+  const auto answer = state.admit(said);
+  const auto& known = state.map().reachable();
+  const bool is_taken = std::ranges::find(known, said.key.hub, &proto::HubKey::hub) != known.end();
+  const bool is_known = std::ranges::find(known, said.key) != known.end();
+  if (answer.admission == hub::LinkAdmission::accept && is_taken && !is_known)
+    fail(Checker::one_id, "hub " + std::to_string(at) + " admits a newcomer with an id in use");
+  return answer;
+}
+
 void World::welcome(std::size_t wire, std::uint64_t dialler_life, std::uint64_t acceptor_life) {
   Wire& each = wires_[wire];
   const auto [dialler, acceptor] = std::pair(each.ends[0].hub, each.ends[1].hub);
   if (each.ends[0].open || each.cut || !each.wanted) return;
   if (hubs_[dialler].life != dialler_life || hubs_[acceptor].life != acceptor_life) return;
   if (!takes_part(dialler) || !takes_part(acceptor)) return;
-  const auto answer = hubs_[dialler].state->admit(identity(acceptor));
+  const auto answer = admit(dialler, acceptor);
   if (answer.admission != hub::LinkAdmission::accept) {
     refuse(wire, 0, answer);
     return;

@@ -68,12 +68,10 @@ bool Settled::is_explained(const Wire& wire) const {
     const auto other = world_.identity(hub);
     if (other.instance == refused.instance) continue;
     if (copy && other.key.unique == refused.key.unique) return true;
-    if (admission != hub::LinkAdmission::id_taken || other.key.hub != refused.key.hub) continue;
-    const bool preferred = other.configured != refused.configured
-                               ? other.configured
-                               : other.key.unique < refused.key.unique;
-    // Of two configured hubs that meet neither gives way.
-    if (preferred || (hub == refusing && other.configured)) return true;
+    // One whose id was drawn draws again.
+    if (admission == hub::LinkAdmission::id_taken && other.key.hub == refused.key.hub &&
+        refused.configured)
+      return true;
   }
   return false;
 }

@@ -26,7 +26,7 @@ inline constexpr std::uint64_t kRetryOfCopies = 10'000;
 enum class Checker : std::uint8_t {
   never_back,     ///< a record is not sent back over the link that it came from
   joined,         ///< every link stands, or was refused for a reason that is true
-  one_id,         ///< of connected hubs no two have one hub id
+  one_id,         ///< of connected hubs no two have one hub id, and the first one keeps it
   equal_tables,   ///< connected hubs know the same hubs and have the same digest
   shortest,       ///< every way costs what the cheapest one costs
   arrives,        ///< frames that follow the next hops arrive, without a loop, within 31 hops
@@ -124,6 +124,7 @@ class World {
   void dial_again(std::size_t wire);
   void dial(std::size_t wire);
   void welcome(std::size_t wire, std::uint64_t dialler_life, std::uint64_t acceptor_life);
+  [[nodiscard]] hub::LinkAdmissionAnswer admit(std::size_t at, std::size_t newcomer);
   void open(std::size_t wire, int end, std::uint64_t connection);
   void close(std::size_t wire, int end, bool tell);
   void refuse(std::size_t wire, int refusing, const hub::LinkAdmissionAnswer& answer);

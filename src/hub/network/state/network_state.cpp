@@ -31,17 +31,20 @@ LinkAdmissionAnswer NetworkState::admit(const HubIdentity& newcomer) const {
     return gives_way ? LinkAdmissionAnswer{LinkAdmission::draw_again}
                      : LinkAdmissionAnswer{LinkAdmission::id_taken, self.key};
   }
+  std::optional<proto::HubKey> holder;
+  bool is_known = false;
   for (const proto::HubKey& hub : map_.reachable()) {
     if (hub == self.key) continue;
     const auto known = identity_of(*store_.find(hub));
     if (!known) continue;
-    if (hub.unique == newcomer.key.unique) {
-      if (known->instance != newcomer.instance) return {LinkAdmission::is_copy, hub};
-    } else if (hub.hub == newcomer.key.hub && is_preferred(*known, newcomer)) {
-      return {LinkAdmission::id_taken, hub};
-    }
+    if (hub.unique == newcomer.key.unique && known->instance != newcomer.instance)
+      return {LinkAdmission::is_copy, hub};
+    is_known = is_known || hub == newcomer.key;
+    if (hub.hub == newcomer.key.hub && hub != newcomer.key) holder = hub;
   }
-  return {};
+  // Two parts of a network met: all hubs see which of both keeps the id.
+  if (is_known || !holder) return {};
+  return {LinkAdmission::id_taken, holder};
 }
 
 NetworkState::Link* NetworkState::find(LinkNumber number) {

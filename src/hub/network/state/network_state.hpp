@@ -142,6 +142,8 @@ class NetworkState {
 
   NetworkState(HubIdentity self, HubWords words);
 
+  /// Refuses each newcomer with a hub id in use: nobody has verified anything that it says of
+  /// itself.
   [[nodiscard]] LinkAdmissionAnswer admit(const HubIdentity& newcomer) const;
 
   /// A connection of a link begins: the first one, or the next one after a break. All records go

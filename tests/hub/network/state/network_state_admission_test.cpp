@@ -35,15 +35,35 @@ TEST_F(HubWithTwoLinks, RefusesItselfAndCopies) {
       << "out of reach: a restart";
 }
 
-TEST_F(HubWithTwoLinks, RefusesAnIdThatAnotherHubKeeps) {
+TEST_F(HubWithTwoLinks, RefusesEachNewcomerWithAnIdThatAnotherHubHas) {
   const HubIdentity worse{hub_key(3, 99), proto::HubInstance{9}, true};
-  EXPECT_EQ(hub_.admit(worse).admission, LinkAdmission::id_taken);
-  EXPECT_EQ(hub_.admit(worse).holder, three_.key);
   const HubIdentity better{{HubId{3}, {}}, proto::HubInstance{9}, true};
-  EXPECT_EQ(hub_.admit(better).admission, LinkAdmission::accept) << "hub 3 will see it, and leave";
+  for (const HubIdentity& newcomer : {worse, better}) {
+    EXPECT_EQ(hub_.admit(newcomer).admission, LinkAdmission::id_taken);
+    EXPECT_EQ(hub_.admit(newcomer).holder, three_.key);
+  }
   const HubIdentity own{hub_key(5, 99), proto::HubInstance{9}, true};
   EXPECT_EQ(hub_.admit(own).admission, LinkAdmission::id_taken);
   EXPECT_EQ(hub_.admit(own).holder, hub_.self().key);
+}
+
+TEST_F(HubWithTwoLinks, AdmitsAHubWithAnIdThatWasFreed) {
+  const HubIdentity lost_its_state{hub_key(3, 99), proto::HubInstance{9}, true};
+  hub_.end_link(kSecond);
+  hub_.advance(later_);
+  EXPECT_EQ(hub_.admit(lost_its_state).admission, LinkAdmission::accept);
+}
+
+TEST_F(HubWithTwoLinks, AdmitsAFurtherLinkOfOneOfTwoHubsThatMetWithOneId) {
+  const HubIdentity twin{hub_key(3, 99), proto::HubInstance{9}, true};
+  hub_.take_record(kFirst, bytes(twin, 1, {{two_.key, 10}}), later_);
+  hub_.take_record(kFirst, bytes(two_, 2, {{twin.key, 10}, {hub_key(5), 10}}), later_);
+  hub_.advance(later_);
+  ASSERT_EQ(hub_.map().reachable().size(), 4u);
+  EXPECT_EQ(hub_.admit(three_).admission, LinkAdmission::accept) << "it is no newcomer";
+  EXPECT_EQ(hub_.admit(twin).admission, LinkAdmission::accept);
+  const HubIdentity third{hub_key(3, 98), proto::HubInstance{10}, true};
+  EXPECT_EQ(hub_.admit(third).admission, LinkAdmission::id_taken);
 }
 
 TEST(NetworkStateAdmission, DrawsAgainForAConfiguredNewcomer) {
