@@ -126,6 +126,14 @@ void HubLink::warn_of_crowding() const {
                "reached for longest are thrown away; is a hub there that invents others?");
 }
 
+void HubLink::warn_of_forgery(const NetworkState::Hearsay& forgery) const {
+  log_line(LogLevel::warning, {"records", name_},
+           "link " + name_ + " to " + title() + ": says of hub " +
+               std::to_string(forgery.hub.hub.value()) + " what that hub itself did not say over " +
+               "its own link, " + std::to_string(forgery.lead) +
+               " changes ahead; it is not believed; is a hub there that forges records?");
+}
+
 proto::route::KeepAlive HubLink::say_keep_alive(std::uint64_t digest, milliseconds now,
                                                 std::int64_t wall_ns) {
   keep_alive_at_ = now + milliseconds{keep_alive_ms_};

@@ -81,6 +81,8 @@ class HubLink {
   [[nodiscard]] bool is_refused_id(const DetachedEvent& event) const;
   /// The log says that more records come over it than there is room for. REQUIRES: peer().
   void warn_of_crowding() const;
+  /// The same of a record that it brings, of a hub that has a link of its own to this one.
+  void warn_of_forgery(const NetworkState::Hearsay& forgery) const;
   [[nodiscard]] bool connected() const { return connected_; }
   /// May it bring frames of that hub's nodes?
   [[nodiscard]] bool allows(HubId hub) const {

@@ -281,8 +281,10 @@ std::optional<milliseconds> Links::next_deadline() const {
 void Links::advance(Moment moment) {
   network_.advance(moment.now);
   send_all(network_.take_sendings());
-  if (const auto crowding = network_.take_crowding()) {
-    if (const HubLink* link = links_.find(*crowding)) link->warn_of_crowding();
+  if (const HubLink* link = links_.find(network_.take_crowding().value_or(LinkNumber{})))
+    link->warn_of_crowding();
+  if (const auto forgery = network_.take_forgery()) {
+    if (const HubLink* link = links_.find(forgery->link)) link->warn_of_forgery(*forgery);
   }
   publish_routes();
   if (map_seen_ != network_.maps()) {

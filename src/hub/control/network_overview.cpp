@@ -70,6 +70,7 @@ std::vector<LinkView> NetworkOverview::links() const {
 std::vector<NetworkView::Count> NetworkOverview::not_taken() const {
   const NameCopies* names = parts_.names.copies();
   return {{"links.malformed", parts_.links.malformed()},
+          {"links.records_refused", parts_.links.network().hearsay()},
           {"links.joins_refused", parts_.groups.refused()},
           {"links.names_refused", names == nullptr ? 0 : names->refused()}};
 }

@@ -82,5 +82,36 @@ TEST(NetworkOverview, CountsWhatCameOverLinksAndWasNotTaken) {
   EXPECT_EQ(malformed(), 1u);
 }
 
+TEST(NetworkOverview, CountsRecordsOfOneNeighbourThatAnotherOneForged) {
+  LinkedRigs hubs;
+  hubs.link();
+  const SessionRef of_b = hubs.a.attached().session;
+  LinkRig liar(3, LinkRig::dialling("liar"));
+  liar.links.tick(liar.moment());
+  ASSERT_FALSE(hubs.a.admit(liar.dialled.back().hello));
+  const AttachCommand& of_liar = hubs.a.attached();
+  proto::route::RecordPart forged;
+  forged.hub = hubs.b.links.network().self().key;
+  forged.instance = hubs.b.facts.instance;
+  forged.sequence = 900;
+  (void)hubs.a.take_frames();
+  testing::internal::CaptureStderr();
+  hubs.a.links.on_route(of_liar.session, of_liar.attachment, proto::encode(forged),
+                        hubs.a.moment());
+  const std::string logged = testing::internal::GetCapturedStderr();
+  EXPECT_NE(logged.find("link liar to hub 3 'hub-3': says of hub 2"), std::string::npos) << logged;
+  const NetworkOverview at_a({hubs.a.facts, hubs.a.links, hubs.a.names, hubs.a.groups, {}});
+  EXPECT_STREQ(at_a.not_taken()[1].name, "links.records_refused");
+  EXPECT_EQ(at_a.not_taken()[1].value, 1u);
+  std::size_t told = 0;
+  for (const SendControlCommand& each : hubs.a.take_frames()) {
+    const auto part = read_part({each.frame.begin() + proto::kHeaderSize, each.frame.end()});
+    const bool is_forged = part != nullptr && part->said.sequence == 900;
+    EXPECT_TRUE(!is_forged || each.session.generation == of_b.generation);
+    told += is_forged ? 1 : 0;
+  }
+  EXPECT_EQ(told, 1u) << "the hub that it is of, alone";
+}
+
 }  // namespace
 }  // namespace gimnet::hub

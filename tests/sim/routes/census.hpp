@@ -14,6 +14,8 @@ enum class Event : std::uint8_t {
   lost_record,
   other_cost,
   damped,
+  forged_record,
+  refused_record,
   removed_link,
   resumed,
   partition,
@@ -31,11 +33,13 @@ enum class Event : std::uint8_t {
   took_over,
   lost_name,
 };
-inline constexpr std::array<std::string_view, 21> kEventNames = {
-    "reset",        "cut",        "lost_record",     "other_cost", "damped",         "removed_link",
-    "resumed",      "partition",  "lost_state",      "outage",     "restart",        "refused_copy",
-    "left_as_copy", "refused_id", "left_for_its_id", "drew_again", "asked_old_link", "too_far",
-    "refused_name", "took_over",  "lost_name"};
+inline constexpr std::array<std::string_view, 23> kEventNames = {
+    "reset",           "cut",           "lost_record",    "other_cost",
+    "damped",          "forged_record", "refused_record", "removed_link",
+    "resumed",         "partition",     "lost_state",     "outage",
+    "restart",         "refused_copy",  "left_as_copy",   "refused_id",
+    "left_for_its_id", "drew_again",    "asked_old_link", "too_far",
+    "refused_name",    "took_over",     "lost_name"};
 
 /// Counts of each. Thread safety: none.
 class Census {

@@ -5,8 +5,8 @@
 namespace gimnet::sim::routes {
 namespace {
 
-constexpr std::uint64_t kKinds = 11;
-constexpr std::uint64_t kFirstKindOfHubs = 8;
+constexpr std::uint64_t kKinds = 12;
+constexpr std::uint64_t kFirstKindOfHubs = 9;
 constexpr std::uint64_t kOutageMost = 4'000;
 
 }  // namespace
@@ -72,10 +72,30 @@ void World::fault_of_a_wire(std::uint64_t kind) {
         after_ms(outage, [this, wire, &end] { damp(end, wire, false); });
       }
       break;
+    case 7:
+      forge(wire, &end == &each.ends[0] ? 0 : 1);
+      break;
     default:
       partition();
       break;
   }
+}
+
+/// The hub at that end says of another one what that hub never said.
+void World::forge(std::size_t wire, int liar) {
+  const End& end = wires_[wire].ends[static_cast<std::size_t>(liar)];
+  const auto victim = static_cast<std::size_t>(random_.below(hubs_.size()));
+  if (!end.open || victim == end.hub || !hubs_[victim].state) return;
+  const hub::StoredRecord* const known = hubs_[end.hub].state->store().find(identity(victim).key);
+  if (known == nullptr || known->head() == nullptr) return;
+  census_.note(Event::forged_record);
+  proto::route::RecordPart part = *known->head();
+  if (random_.chance(200)) part.part = static_cast<std::uint16_t>(random_.between(1, 63));
+  if (random_.chance(200)) part.instance = proto::HubInstance{random_.next()};
+  if (random_.chance(500)) part.neighbours.clear();
+  for (auto& each : part.neighbours) each.cost = 1;
+  part.sequence += random_.chance(500) ? random_.between(1, 3) : random_.between(1, 1'000);
+  pass(wire, 1 - liar, {std::make_shared<const proto::Payload>(proto::encode(part)), 0});
 }
 
 void World::damp(End& end, std::size_t wire, bool damped) {

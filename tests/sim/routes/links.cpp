@@ -85,6 +85,7 @@ void World::open(std::size_t wire, int end, std::uint64_t connection) {
   const std::size_t other = each.ends[static_cast<std::size_t>(1 - end)].hub;
   mine.open = true;
   mine.connection = connection;
+  mine.peer = identity(other).key;
   hub::LinkFacts facts{identity(other), each.plan.name, end == 0,
                        each.plan.costs[static_cast<std::size_t>(end)]};
   hubs_[mine.hub].state->begin_connection(number_of(wire), std::move(facts), now());
@@ -203,12 +204,32 @@ void World::take_record(std::size_t wire, std::size_t hub, const Payload& bytes)
     return known != nullptr && known->bytes == part->bytes;
   };
   const bool was_known = is_known();
+  const auto& ends = wires_[wire].ends;
+  const bool round_about = ends[ends[0].hub == hub ? 0 : 1].peer != part->said.hub;
+  const bool is_hearsay = round_about && hears_itself(hub, part->said.hub);
+  const std::uint64_t refused = state.hearsay();
   state.take_record(number_of(wire), *bytes, now());
+  if (state.hearsay() != refused) census_.note(Event::refused_record);
+  if (is_hearsay && !was_known && is_known())
+    fail(Checker::own_word, "hub " + std::to_string(hub) + " believes link " +
+                                std::to_string(wire) + " what a neighbour did not say");
   // One that waits may be taken from another link first, and then goes to this one.
   if (was_known || !is_known()) return;
   arriving_ = bytes;
   arriving_wire_ = wire;
   arriving_hub_ = hub;
+}
+
+/// Does a link to that hub carry?
+bool World::hears_itself(std::size_t hub, const proto::HubKey& neighbour) const {
+  for (std::size_t wire = 0; wire < wires_.size(); ++wire) {
+    for (const End& end : wires_[wire].ends) {
+      if (end.hub == hub && end.open && end.peer == neighbour &&
+          hubs_[hub].state->is_up(number_of(wire)))
+        return true;
+    }
+  }
+  return false;
 }
 
 void World::keep_alive(std::size_t wire) {

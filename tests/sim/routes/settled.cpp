@@ -38,6 +38,7 @@ void Settled::check() {
   check_ids();
   find_shortest();
   for (std::size_t hub = 0; hub < world_.hubs_.size(); ++hub) {
+    check_words(hub);
     check_tables(hub);
     check_ways(hub);
     check_names(hub);
@@ -82,6 +83,23 @@ void Settled::check_ids() {
     const HubId id = world_.identity(hub).key.hub;
     if (!ids.emplace(component_[hub], id).second)
       world_.fail(Checker::one_id, "two connected hubs have the id " + std::to_string(id.value()));
+  }
+}
+
+/// Each hub has of each other one what that one says of itself.
+void Settled::check_words(std::size_t hub) {
+  for (std::size_t other = 0; other < world_.hubs_.size(); ++other) {
+    if (component_[other] != component_[hub]) continue;
+    const proto::HubKey key = world_.identity(other).key;
+    const hub::StoredRecord* const record = world_.hubs_[hub].state->store().find(key);
+    const hub::StoredRecord& own = *world_.hubs_[other].state->store().find(key);
+    if (record == nullptr) continue;
+    record->each_counting([&](const hub::StoredPart& part) {
+      const hub::PartRef said = own.part(part.said.part);
+      if (said == nullptr || said->bytes != part.bytes)
+        world_.fail(Checker::own_word, "hub " + std::to_string(hub) + " has a record of hub " +
+                                           std::to_string(other) + " that is not its own");
+    });
   }
 }
 

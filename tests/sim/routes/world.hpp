@@ -34,10 +34,11 @@ enum class Checker : std::uint8_t {
   equal_names,    ///< connected hubs know the same names
   one_owner,      ///< of connected hubs one has a name
   names_bounded,  ///< names take a bounded room, and few are under way
+  own_word,       ///< what a neighbour says of itself comes from it alone, and is known to all
 };
-inline constexpr std::array<std::string_view, 10> kCheckerNames = {
-    "never_back", "joined", "one_id",      "equal_tables", "shortest",
-    "arrives",    "quiet",  "equal_names", "one_owner",    "names_bounded"};
+inline constexpr std::array<std::string_view, 11> kCheckerNames = {
+    "never_back", "joined",      "one_id",    "equal_tables",  "shortest", "arrives",
+    "quiet",      "equal_names", "one_owner", "names_bounded", "own_word"};
 
 struct Failure {
   Checker checker;
@@ -71,6 +72,7 @@ struct End {
   milliseconds last_arrival{0};  ///< messages towards this end come in order
   bool lose_next = false;        ///< a record towards this end gets lost unseen
   bool damped = false;           ///< it says the highest cost
+  proto::HubKey peer;            ///< while it is open
   int names = 0;                 ///< NAMES under way towards this end
   std::uint64_t names_connection = 0;
 };
@@ -132,6 +134,7 @@ class World {
   void arrive(std::size_t wire, int to, std::uint64_t connection, std::uint64_t life,
               const Message& message);
   void take_record(std::size_t wire, std::size_t hub, const Payload& bytes);
+  [[nodiscard]] bool hears_itself(std::size_t hub, const proto::HubKey& neighbour) const;
   void keep_alive(std::size_t wire);
   void cut(std::size_t wire);
   void notice_silence(std::size_t wire);
@@ -147,6 +150,7 @@ class World {
   void fault();
   void fault_of_a_wire(std::uint64_t kind);
   void fault_of_a_hub(std::uint64_t kind);
+  void forge(std::size_t wire, int liar);
   void damp(End& end, std::size_t wire, bool damped);
   void partition();
   void heal();
@@ -189,6 +193,7 @@ class Settled {
   void check_wires();
   void check_ids();
   void check_tables(std::size_t hub);
+  void check_words(std::size_t hub);
   void check_ways(std::size_t hub);
   /// names.cpp
   void check_names(std::size_t hub);

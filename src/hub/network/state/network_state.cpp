@@ -82,9 +82,9 @@ void NetworkState::take_record(LinkNumber number, proto::Payload bytes,
   const StoredRecord* record = store_.find(part->said.hub);
   const PartRef known = record == nullptr ? nullptr : record->part(part->said.part);
   const bool is_own = part->said.hub == own_.identity().key;
-  if (!is_own && known != nullptr && !is_newer(part->said, known->said)) {
+  if (!is_own && known != nullptr && !is_newer(*part, *known)) {
     // Repairs leave out what cannot be reached here, and the other side may believe that it can.
-    if (record->unreachable_since && is_newer(known->said, part->said)) send(number, known);
+    if (record->unreachable_since && is_newer(*known, *part)) send(number, known);
     return;
   }
   if (link->pace.admit(part, now)) take(number, part, now);
@@ -93,10 +93,14 @@ void NetworkState::take_record(LinkNumber number, proto::Payload bytes,
 void NetworkState::take(LinkNumber from, const PartRef& part, std::chrono::milliseconds now) {
   if (part->said.hub == own_.identity().key) {
     own_.hear(part->said);
+    const StoredRecord* own = store_.find(part->said.hub);
+    const PartRef mine = own == nullptr ? nullptr : own->part(part->said.part);
+    if (mine != nullptr && contradict(*mine, *part)) own_.go_on_behind(part->said.sequence);
     // Of a hub and its copy the one with the lower instance stays.
     if (own_.living_copy() > own_.identity().instance) own_.forget_copy();
     return;
   }
+  if (has_own_word(from, part->said.hub)) return refuse(from, part, now);
   const std::uint64_t crowded = store_.too_many();
   const auto taken = store_.take(part, now);
   if (store_.too_many() != crowded && now >= crowded_pace_.next()) {
@@ -106,6 +110,39 @@ void NetworkState::take(LinkNumber from, const PartRef& part, std::chrono::milli
   if (taken != RecordStore::Taken::newer) return;
   if (store_.is_near(part->said.hub)) map_changed_ = true;
   flood(part, from);
+}
+
+/// Is that hub at the other end of another link, which carries? It alone is believed about itself
+/// then.
+bool NetworkState::has_own_word(LinkNumber from, const proto::HubKey& hub) const {
+  const auto found = links_.find(from);
+  const bool is_its_own = found != links_.end() && found->second.facts.peer.key == hub;
+  if (is_its_own || !store_.is_linked(hub)) return false;
+  return std::ranges::any_of(links_, [&hub](const auto& each) {
+    return each.second.has_mark && each.second.facts.peer.key == hub;
+  });
+}
+
+/// Passes it to the hub that it is of, and to no other: that hub goes on behind it. Hubs further
+/// away would keep an invented one otherwise.
+void NetworkState::refuse(LinkNumber from, const PartRef& part, std::chrono::milliseconds now) {
+  const proto::HubKey& hub = part->said.hub;
+  const StoredRecord* record = store_.find(hub);
+  const PartRef known = record == nullptr ? nullptr : record->part(part->said.part);
+  if (known != nullptr && !is_newer(*part, *known)) return;
+  ++hearsay_;
+  for (auto& [number, link] : links_) {
+    if (link.facts.peer.key != hub) continue;
+    send(number, part);
+    const bool is_newest = link.refused == nullptr || is_newer(*part, *link.refused);
+    if (part->said.part != 0 || !is_newest) continue;
+    link.refused = part;
+    link.refused_from = from;
+  }
+  const std::uint64_t lead = part->said.sequence - (known == nullptr ? 0 : known->said.sequence);
+  if (lead <= kHonestLead || now < forgery_pace_.next()) return;
+  forgery_pace_.note_done(now);
+  forgery_ = {from, hub, lead};
 }
 
 void NetworkState::take_mark(LinkNumber number) {
@@ -145,8 +182,12 @@ void NetworkState::set_damped(LinkNumber number, bool damped) {
 }
 
 void NetworkState::end_link(LinkNumber number) {
-  if (links_.erase(number) == 0) return;
+  const auto ended = links_.extract(number);
+  if (ended.empty()) return;
   note_links();
+  // Its hub may have started again, or was one of two copies: others know more of it now.
+  if (ended.mapped().refused != nullptr)
+    heard_again_.emplace_back(ended.mapped().refused_from, ended.mapped().refused);
   // Before the pause is over: frames under way go by another link, if there is one.
   map_ = NetworkMap(own_.identity(), store_, carrying_links());
   ++maps_;
@@ -163,6 +204,7 @@ void NetworkState::note_links() {
 
 void NetworkState::leave() {
   links_.clear();
+  heard_again_.clear();
   note_links();
   sendings_.clear();
   own_.forget_copy();
@@ -192,6 +234,7 @@ HubId NetworkState::draw_hub_id(std::uint64_t random) const {
 }
 
 void NetworkState::advance(std::chrono::milliseconds now) {
+  for (const auto& [from, part] : std::exchange(heard_again_, {})) take(from, part, now);
   for (auto& [number, link] : links_) {
     for (const PartRef& part : link.pace.take_due(now)) take(number, part, now);
   }
@@ -233,7 +276,8 @@ std::optional<std::chrono::milliseconds> NetworkState::next_due() const {
     due = std::min(due.value_or(time), time);
   };
   if (map_changed_) note(next_map_at_);
-  if (links_changed_ || reachable_changed_) note(std::chrono::milliseconds::min());
+  if (links_changed_ || reachable_changed_ || !heard_again_.empty())
+    note(std::chrono::milliseconds::min());
   for (const auto& [number, link] : links_) {
     if (const auto waits = link.pace.next_due()) note(*waits);
   }

@@ -36,7 +36,7 @@ class PartPace {
       return true;
     }
     if (heard.waiting == nullptr) ++waiting_;
-    if (heard.waiting == nullptr || is_newer(part->said, heard.waiting->said)) heard.waiting = part;
+    if (heard.waiting == nullptr || is_newer(*part, *heard.waiting)) heard.waiting = part;
     return false;
   }
 
@@ -137,6 +137,9 @@ class NetworkState {
   /// Between two times that a link is named which brings more records than there is room for.
   static constexpr std::chrono::milliseconds kCrowdedPause = std::chrono::minutes(1);
 
+  /// A copy that came round about may be faster than the hub's own word by so many changes.
+  static constexpr std::uint64_t kHonestLead = 64;
+
   /// The pause between two looks for records that are too old.
   static constexpr std::chrono::milliseconds kForgetPause = std::chrono::seconds(10);
 
@@ -196,6 +199,19 @@ class NetworkState {
   [[nodiscard]] std::optional<LinkNumber> take_crowding() {
     return std::exchange(crowding_, std::nullopt);
   }
+  /// A newer part of a neighbour's record that came over another link.
+  struct Hearsay {
+    LinkNumber link;  ///< that brought it
+    proto::HubKey hub;
+    std::uint64_t lead = 0;  ///< changes that it is ahead of what the hub itself said
+  };
+  /// One that no honest hub is likely to bring, at most one each kCrowdedPause. Nothing: there was
+  /// none since the last call.
+  [[nodiscard]] std::optional<Hearsay> take_forgery() {
+    return std::exchange(forgery_, std::nullopt);
+  }
+  /// Parts of neighbours' records that other links brought and that were not taken.
+  [[nodiscard]] std::uint64_t hearsay() const { return hearsay_; }
   /// Messages that were not what they should be.
   [[nodiscard]] std::uint64_t malformed() const { return malformed_; }
 
@@ -208,9 +224,14 @@ class NetworkState {
     std::optional<std::chrono::milliseconds> differs_since;
     std::chrono::milliseconds repair_pause = kRepairPauses.first;
     PartPace pace;
+    /// The newest part 0 of the peer's record that another link brought. Null: none.
+    PartRef refused;
+    LinkNumber refused_from;
   };
   [[nodiscard]] Link* find(LinkNumber number);
   void take(LinkNumber from, const PartRef& part, std::chrono::milliseconds now);
+  [[nodiscard]] bool has_own_word(LinkNumber from, const proto::HubKey& hub) const;
+  void refuse(LinkNumber from, const PartRef& part, std::chrono::milliseconds now);
   void say_own(std::chrono::milliseconds now);
   void compute_map(std::chrono::milliseconds now);
   void note_links();
@@ -233,6 +254,10 @@ class NetworkState {
   ChangePace forget_pace_{{kForgetPause, kForgetPause}};
   ChangePace crowded_pace_{{kCrowdedPause, kCrowdedPause}};
   std::optional<LinkNumber> crowding_;
+  std::vector<std::pair<LinkNumber, PartRef>> heard_again_;  ///< refused before their links ended
+  ChangePace forgery_pace_{{kCrowdedPause, kCrowdedPause}};
+  std::optional<Hearsay> forgery_;
+  std::uint64_t hearsay_ = 0;
   std::vector<Sending> sendings_;
   std::uint64_t malformed_ = 0;
 };

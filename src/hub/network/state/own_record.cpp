@@ -16,7 +16,10 @@ bool is_preferred(const HubIdentity& hub, const HubIdentity& to) {
 }
 
 OwnRecord::OwnRecord(HubIdentity identity, HubWords words)
-    : identity_(identity), words_(std::move(words)) {}
+    : identity_(identity), words_(std::move(words)), go_on_pace_([&identity] {
+        const auto pause = kGoOnPause + std::chrono::milliseconds(identity.instance.value() >> 56);
+        return ChangePace::Pauses{pause, pause};
+      }()) {}
 
 void OwnRecord::set_neighbours(const std::vector<Neighbour>& neighbours) {
   for (Part& part : parts_) {
@@ -56,7 +59,14 @@ void OwnRecord::renumber(HubId hub) {
 }
 
 void OwnRecord::hear(const RecordPart& heard) {
-  if (heard.instance == identity_.instance && heard.sequence <= sequence_) return;
+  if (heard.instance == identity_.instance) {
+    // A part that this hub never said was invented: it says that there is nothing in it.
+    if (heard.part >= parts_.size()) {
+      parts_.resize(heard.part + std::size_t{1});
+      changed_ = true;
+    }
+    if (heard.sequence <= parts_[heard.part].sequence) return;
+  }
   // The part would hold against what was said, or against what this hub says there next.
   RecordPart mine;
   mine.instance = identity_.instance;
@@ -66,7 +76,7 @@ void OwnRecord::hear(const RecordPart& heard) {
   next.sequence = sequence_;
   const bool equal = heard.sequence == mine.sequence || heard.sequence == next.sequence;
   if (!equal && !is_newer(heard, mine) && !is_newer(heard, next)) return;
-  pass_ = std::max(pass_.value_or(0), heard.sequence);
+  go_on_behind(heard.sequence);
   if (heard.instance == identity_.instance) return;
   behind_ = heard.instance;
   if (heard.part != 0 || heard.behind != identity_.instance) return;

@@ -65,7 +65,9 @@ class OwnRecord {
  public:
   static constexpr ChangePace::Pauses kChangePauses{std::chrono::milliseconds(50),
                                                     std::chrono::seconds(1)};
-  /// Between two times that the hub goes on behind its own record. The first time is at once.
+  /// Between two times that the hub goes on behind its own record. The first time is at once. Up to
+  /// 255 ms more by its instance: two copies that went on at the same moments would never hear an
+  /// answer to what they said last.
   static constexpr std::chrono::milliseconds kGoOnPause = std::chrono::seconds(1);
 
   OwnRecord(HubIdentity identity, HubWords words);
@@ -84,6 +86,8 @@ class OwnRecord {
   /// was named again. One record alone may be of a process that has ended. Nothing: none is known.
   [[nodiscard]] std::optional<proto::HubInstance> living_copy() const { return living_copy_; }
   void forget_copy();
+  /// Another part goes by that sequence of this instance: all of this hub's are to pass it.
+  void go_on_behind(std::uint64_t sequence) { pass_ = std::max(pass_.value_or(0), sequence); }
   /// The next change is said at once, however many were said lately.
   void hurry() { change_pace_.hurry(); }
 
@@ -110,7 +114,7 @@ class OwnRecord {
   proto::HubInstance behind_;
   /// The highest sequence heard of another instance that has to be passed. Nothing: none.
   std::optional<std::uint64_t> pass_;
-  ChangePace go_on_pace_{{kGoOnPause, kGoOnPause}};
+  ChangePace go_on_pace_;
   bool is_named_ = false;  ///< by a record that is to be passed
   /// The sequence of part 0 when this hub last went on behind a record that named it.
   std::optional<std::uint64_t> question_;

@@ -58,6 +58,15 @@ bool is_newer(const RecordPart& part, const RecordPart& than) {
   return higher == (apart <= kFarApart);
 }
 
+bool is_newer(const StoredPart& part, const StoredPart& than) {
+  return is_newer(part.said, than.said) || (contradict(part, than) && part.bytes > than.bytes);
+}
+
+bool contradict(const StoredPart& one, const StoredPart& other) {
+  return one.said.sequence == other.said.sequence && one.said.instance == other.said.instance &&
+         one.bytes != other.bytes;
+}
+
 PartRef StoredRecord::part(std::uint16_t number) const {
   const auto found = place_of(parts_, number);
   return found != parts_.end() && (*found)->said.part == number ? *found : nullptr;
@@ -84,7 +93,7 @@ RecordStore::Taken RecordStore::take(const PartRef& part, std::chrono::milliseco
   const RecordPart& said = part->said;
   auto found = records_.find(said.hub);
   const PartRef before = found == records_.end() ? nullptr : found->second.part(said.part);
-  if (before != nullptr && !is_newer(said, before->said)) return Taken::known;
+  if (before != nullptr && !is_newer(*part, *before)) return Taken::known;
   if (!is_linked(said.hub)) {
     const std::size_t freed = before == nullptr ? 0 : bytes_of(*before);
     const std::size_t added = bytes_of(*part) - std::min(freed, bytes_of(*part));

@@ -32,6 +32,11 @@ using PartRef = std::shared_ptr<const StoredPart>;
 /// that invents a sequence from the far future does not silence the hub that it speaks for.
 [[nodiscard]] bool is_newer(const proto::route::RecordPart& part,
                             const proto::route::RecordPart& than);
+/// The same of parts as they came. Of two that are equal but for their other contents one is
+/// forged: the one with the higher bytes counts as newer, so that all hubs have the same one.
+[[nodiscard]] bool is_newer(const StoredPart& part, const StoredPart& than);
+/// Do both claim to be one thing that one process said, and differ?
+[[nodiscard]] bool contradict(const StoredPart& one, const StoredPart& other);
 
 /// The record of one hub: its parts by number. Part 0 names the instance that counts; parts of
 /// another instance do not count.
@@ -96,6 +101,7 @@ class RecordStore {
 
   /// The hubs at the other ends of links, whose records are always taken. REQUIRES: ascending.
   void set_linked(std::vector<proto::HubKey> hubs) { linked_ = std::move(hubs); }
+  [[nodiscard]] bool is_linked(const proto::HubKey& hub) const;
   /// These hubs can be reached, and no others. REQUIRES: ascending.
   void set_reachable(std::span<const proto::HubKey> hubs, std::chrono::milliseconds now);
   /// May a record of that hub change which hubs can be reached, and how? It is reachable or linked,
@@ -112,7 +118,6 @@ class RecordStore {
 
  private:
   using Records = std::map<proto::HubKey, StoredRecord>;
-  [[nodiscard]] bool is_linked(const proto::HubKey& hub) const;
   [[nodiscard]] bool has_room_for(HubId hub);
   [[nodiscard]] bool has_room_for(std::size_t bytes, bool reachable);
   void put(StoredRecord& record, const PartRef& part);

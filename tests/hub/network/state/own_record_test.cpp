@@ -172,6 +172,27 @@ TEST(OwnRecordCopy, IsOneThatWentOnBehindThisInstance) {
   EXPECT_FALSE(record.living_copy()) << "asked anew";
 }
 
+TEST(OwnRecordForged, SaysNothingInAPartThatItNeverSaid) {
+  OwnRecord record = make_record();
+  (void)record.take_due(kBegin);
+  auto forged = said(record.identity(), 1, {{hub_key(2), 1}}, 3);
+  record.hear(forged);
+  auto due = record.take_due(kBegin + milliseconds(1'000));
+  ASSERT_EQ(due.size(), 4u);
+  EXPECT_EQ(due[3]->said.part, 3);
+  EXPECT_TRUE(due[3]->said.neighbours.empty());
+  EXPECT_GT(due[3]->said.sequence, 1u);
+  forged.sequence = 500;
+  record.hear(forged);
+  due = record.take_due(kBegin + milliseconds(5'000));
+  ASSERT_EQ(due.size(), 4u) << "it goes on behind it with all its parts";
+  EXPECT_GT(due[3]->said.sequence, 500u);
+  forged.instance = proto::HubInstance{1};
+  forged.part = 5;
+  record.hear(forged);
+  EXPECT_TRUE(record.take_due(kBegin + milliseconds(9'000)).empty()) << "it does not count";
+}
+
 TEST(OwnRecordRenumber, GoesOnWithItsSequence) {
   OwnRecord record = make_record();
   record.set_neighbours(neighbours_up_to(65));
