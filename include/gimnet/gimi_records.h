@@ -104,7 +104,7 @@ typedef struct gimi_edge {
   uint32_t cost;
 } gimi_edge;
 
-/** A hub that the asked one knows, itself among them, and the way to it. */
+/** A hub that the asked one can reach, or could once, itself among them, and the way to it. */
 typedef struct gimi_network_hub_record {
   const char* name;
   const char* version;

@@ -52,8 +52,10 @@ std::vector<HubView> NetworkOverview::hubs() const {
   std::set<HubId> shown;
   for (const HubView& hub : hubs) shown.insert(hub.hub);
   for (const auto& [key, record] : store.records()) {
-    // A hub that lost its state, or its id, leaves a record behind: each id is shown once.
-    if (record.head() == nullptr || std::ranges::binary_search(reachable, key)) continue;
+    // A hub that may link can invent others. One that lost its state, or its id, leaves a record
+    // behind: each id is shown once.
+    if (record.head() == nullptr || !record.was_reached) continue;
+    if (std::ranges::binary_search(reachable, key)) continue;
     if (shown.insert(key.hub).second) hubs.push_back(view(key));
   }
   std::sort(hubs.begin() + 1, hubs.end(),

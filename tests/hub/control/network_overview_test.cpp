@@ -46,6 +46,22 @@ TEST(NetworkOverview, ShowsHubsAndLinksOfBothEnds) {
   EXPECT_FALSE(at_a.hubs()[1].reachable);
 }
 
+TEST(NetworkOverview, ShowsNoHubThatCouldNeverBeReached) {
+  LinkedRigs hubs;
+  hubs.link();
+  const NetworkOverview at_a({hubs.a.facts, hubs.a.links, hubs.a.names, hubs.a.groups, {}});
+  proto::route::RecordPart invented;
+  invented.sequence = 1;
+  for (std::uint16_t id = 100; id < 2'600; ++id) {
+    invented.hub.hub = HubId{id};
+    hubs.a.links.on_route(hubs.a.attached().session, hubs.a.attached().attachment,
+                          proto::encode(invented), hubs.a.moment());
+  }
+  hubs.a.pass(milliseconds{1'000});
+  EXPECT_EQ(hubs.a.links.network().store().records().size(), 2'502u);
+  EXPECT_EQ(at_a.hubs().size(), 2u);
+}
+
 TEST(NetworkOverview, ShowsALinkThatTheOtherSideGaveUpWithItsCounts) {
   LinkedRigs hubs;
   const NetworkOverview at_a({hubs.a.facts, hubs.a.links, hubs.a.names, hubs.a.groups, {}});

@@ -205,6 +205,7 @@ void RecordStore::set_reachable(std::span<const proto::HubKey> hubs,
       });
       if (record.unreachable_since) unreachable_bytes_ -= record.bytes();
       record.unreachable_since.reset();
+      record.was_reached = true;
     } else if (!record.unreachable_since) {
       unreachable_bytes_ += record.bytes();
       record.unreachable_since = now;

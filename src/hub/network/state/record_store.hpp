@@ -62,6 +62,7 @@ class StoredRecord {
 
   /// Nothing: the hub can be reached.
   std::optional<std::chrono::milliseconds> unreachable_since;
+  bool was_reached = false;  ///< since this record is known
 
  private:
   std::vector<PartRef> parts_;  ///< ascending by number; at most kPartsMax
