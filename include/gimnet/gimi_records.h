@@ -101,7 +101,7 @@ typedef struct gimi_connection_record {
  * array of its own. */
 typedef struct gimi_edge {
   uint32_t hub_id;
-  uint32_t cost;
+  uint32_t cost; /**< 0: not measured yet. */
 } gimi_edge;
 
 /** A hub that the asked one can reach, or could once, itself among them, and the way to it. */
@@ -112,7 +112,7 @@ typedef struct gimi_network_hub_record {
   size_t edge_count;
   uint32_t hub_id;
   uint32_t distance; /**< Links on the way; 0: the hub that was asked. */
-  uint32_t cost;     /**< Of the way. */
+  uint32_t cost;     /**< Of the way; 0 also while its first link is not measured. */
   uint32_t next_hop; /**< Itself for the hub that was asked; 0: there is no way. */
   uint32_t nodes;    /**< 0 of another hub also where they are not known. */
   uint32_t services; /**< The same. */

@@ -19,6 +19,21 @@ std::vector<HubView::Edge> edges_of(const StoredRecord& record) {
 
 }  // namespace
 
+/// Its cost was neither configured nor measured yet.
+bool NetworkOverview::is_unmeasured(LinkNumber number) const {
+  const auto found = parts_.links.all().find(number);
+  return found != parts_.links.all().end() && found->second->known_cost() == 0;
+}
+
+/// A link costs LinkCost::kUnmeasured until it was measured, which is no number for people.
+void NetworkOverview::hide_unmeasured(std::vector<HubView::Edge>& own) const {
+  for (const auto& [number, link] : parts_.links.all()) {
+    if (!link->peer() || !is_unmeasured(number)) continue;
+    for (HubView::Edge& edge : own)
+      if (edge.hub == link->peer()->hub.hub && edge.cost == LinkCost::kUnmeasured) edge.cost = 0;
+  }
+}
+
 std::vector<HubView> NetworkOverview::hubs() const {
   std::vector<HubView> hubs;
   const auto& store = parts_.links.network().store();
@@ -38,11 +53,12 @@ std::vector<HubView> NetworkOverview::hubs() const {
   self.name = parts_.facts.name;
   self.version = parts_.facts.version;
   self.reachable = true;
+  hide_unmeasured(self.neighbours);
   hubs.push_back(std::move(self));
   for (const Way& way : parts_.links.network().map().ways()) {
     HubView hub = view(way.hub);
     hub.distance = way.hops;
-    hub.cost = way.cost;
+    hub.cost = is_unmeasured(way.link) ? 0 : way.cost;
     hub.reachable = way.link != LinkNumber{};
     hub.too_far = !hub.reachable;
     hub.via = parts_.links.next_hops().find(way.hub.hub).neighbour;

@@ -41,6 +41,8 @@ class NetworkOverview final : public NetworkView {
   }
 
  private:
+  [[nodiscard]] bool is_unmeasured(LinkNumber number) const;
+  void hide_unmeasured(std::vector<HubView::Edge>& own) const;
   [[nodiscard]] LinkView view_of(const HubLink& link) const;
   [[nodiscard]] proto::ctrl::LinkState state_of(const HubLink& link) const;
 

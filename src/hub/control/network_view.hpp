@@ -38,7 +38,7 @@ struct HubView {
   std::string name;
   std::string version;
   std::uint16_t distance = 0;  ///< links on the way; 0: this hub
-  std::uint32_t cost = 0;      ///< of the way
+  std::uint32_t cost = 0;      ///< of the way; 0 also while its first link is not measured
   HubId via;                   ///< the next hub; 0: this hub, or no way
   bool reachable = false;
   bool too_far = false;        ///< reachable, but over more links than a frame may cross
@@ -47,7 +47,7 @@ struct HubView {
   /// The neighbours that it names, with costs.
   struct Edge {
     HubId hub;
-    std::uint16_t cost = 0;
+    std::uint16_t cost = 0;  ///< 0: not measured yet
   };
   std::vector<Edge> neighbours;
 };

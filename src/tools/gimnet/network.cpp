@@ -22,6 +22,12 @@ std::string text_if(bool known, std::uint32_t value) { return known ? std::to_st
 
 /// A way, or one that is too long to go.
 bool has_length(const NetworkHub& hub) { return hub.reachable || hub.too_far; }
+/// A link that has just come up has no cost until its round trip was measured.
+bool has_cost(const NetworkHub& hub) {
+  return has_length(hub) && (hub.cost != 0 || hub.distance == 0);
+}
+bool has_cost(const RouteStep& step) { return step.cost != 0 || step.distance == 0; }
+bool has_cost(const GraphEdge& edge) { return edge.cost != 0; }
 
 double microseconds(double ns) { return ns / 1000.0; }
 
@@ -48,7 +54,7 @@ std::string json_of(const std::vector<NetworkHub>& hubs) {
     json.begin_object().member("id", hub.hub_id).member("name", hub.name);
     json.member("version", hub.version);
     member_if(has_length(hub), json, "distance", hub.distance);
-    member_if(has_length(hub), json, "cost", hub.cost);
+    member_if(has_cost(hub), json, "cost", hub.cost);
     member_if(hub.next_hop != 0, json, "via", hub.next_hop);
     json.member("nodes", hub.nodes).member("services", hub.services);
     json.member("reachable", hub.reachable).member("too_far", hub.too_far).end_object();
@@ -64,7 +70,7 @@ std::string text_of(const std::vector<NetworkHub>& hubs, Paint paint) {
                hub.too_far     ? "too far"
                : hub.reachable ? "reachable"
                                : kUnreachable,
-               text_if(has_length(hub), hub.distance), text_if(has_length(hub), hub.cost),
+               text_if(has_length(hub), hub.distance), text_if(has_cost(hub), hub.cost),
                text_if(hub.next_hop != 0, hub.next_hop), std::to_string(hub.nodes),
                std::to_string(hub.services), hub.version},
               right ? Tone::plain : Tone::warning);
@@ -128,7 +134,7 @@ std::string json_of(const std::vector<RouteStep>& way) {
   for (const RouteStep& step : way) {
     json.begin_object().member("hub", step.hub_id).member("name", step.name);
     json.member("next_hop", step.next_hop).member("distance", step.distance);
-    json.member("cost", step.cost).end_object();
+    member_if(has_cost(step), json, "cost", step.cost).end_object();
   }
   return json.end_array().str() + "\n";
 }
@@ -137,7 +143,7 @@ std::string text_of(const std::vector<RouteStep>& way) {
   Table table({"HUB", "NAME", "NEXT", "DISTANCE", "COST"});
   for (const RouteStep& step : way) {
     table.add({std::to_string(step.hub_id), step.name, std::to_string(step.next_hop),
-               std::to_string(step.distance), std::to_string(step.cost)});
+               std::to_string(step.distance), text_if(has_cost(step), step.cost)});
   }
   return table.text();
 }
@@ -150,7 +156,8 @@ std::vector<GraphEdge> edges_of(const std::vector<NetworkHub>& hubs) {
       const auto [found, first] =
           edges.try_emplace(ends, GraphEdge{ends.first, ends.second, edge.cost, false});
       if (first) continue;
-      found->second.cost = std::max(found->second.cost, edge.cost);
+      const bool known = has_cost(found->second) && edge.cost != 0;
+      found->second.cost = known ? std::max(found->second.cost, edge.cost) : 0;
       found->second.agreed = true;
     }
   }
@@ -169,7 +176,8 @@ std::string graph_json(const std::vector<NetworkHub>& hubs) {
   }
   json.end_array().key("links").begin_array();
   for (const GraphEdge& edge : edges_of(hubs)) {
-    json.begin_object().member("a", edge.a).member("b", edge.b).member("cost", edge.cost);
+    json.begin_object().member("a", edge.a).member("b", edge.b);
+    member_if(has_cost(edge), json, "cost", edge.cost);
     json.member("agreed", edge.agreed).end_object();
   }
   return json.end_array().end_object().str() + "\n";
@@ -183,7 +191,8 @@ std::string graph_dot(const std::vector<NetworkHub>& hubs) {
   }
   for (const GraphEdge& edge : edges_of(hubs)) {
     text += "  " + std::to_string(edge.a) + " -- " + std::to_string(edge.b) + " [label=\"" +
-            std::to_string(edge.cost) + "\"" + (edge.agreed ? "" : ", style=dashed") + "];\n";
+            text_if(has_cost(edge), edge.cost) + "\"" + (edge.agreed ? "" : ", style=dashed") +
+            "];\n";
   }
   return text + "}\n";
 }
@@ -197,7 +206,7 @@ std::string graph_ascii(const std::vector<NetworkHub>& hubs) {
     for (const GraphEdge& edge : edges) {
       if (edge.a != hub.hub_id && edge.b != hub.hub_id) continue;
       const std::uint32_t other = edge.a == hub.hub_id ? edge.b : edge.a;
-      text += between + std::to_string(other) + " (" + std::to_string(edge.cost) +
+      text += between + std::to_string(other) + " (" + text_if(has_cost(edge), edge.cost) +
               (edge.agreed ? ")" : ", one-sided)");
       between = ", ";
     }

@@ -31,7 +31,7 @@ struct RouteStep {
   std::string name;
   std::uint32_t next_hop = 0;
   std::uint32_t distance = 0;
-  std::uint32_t cost = 0;
+  std::uint32_t cost = 0;  ///< 0 with a distance: not measured yet
 };
 [[nodiscard]] std::string json_of(const std::vector<RouteStep>& way);
 [[nodiscard]] std::string text_of(const std::vector<RouteStep>& way);
@@ -39,9 +39,9 @@ struct RouteStep {
 /// Two hubs that are linked, with the higher of the costs that both tell.
 struct GraphEdge {
   std::uint32_t a = 0;
-  std::uint32_t b = 0;  ///< larger than a
-  std::uint32_t cost = 0;
-  bool agreed = false;  ///< both tell of it; else it carries nothing
+  std::uint32_t b = 0;     ///< larger than a
+  std::uint32_t cost = 0;  ///< 0: not measured yet
+  bool agreed = false;     ///< both tell of it; else it carries nothing
 };
 /// Ascending.
 [[nodiscard]] std::vector<GraphEdge> edges_of(const std::vector<NetworkHub>& hubs);

@@ -46,6 +46,25 @@ TEST(NetworkOverview, ShowsHubsAndLinksOfBothEnds) {
   EXPECT_FALSE(at_a.hubs()[1].reachable);
 }
 
+TEST(NetworkOverview, ShowsNoCostOfALinkThatWasNotMeasured) {
+  LinkedRigs hubs;
+  hubs.link();
+  const NetworkOverview at_a({hubs.a.facts, hubs.a.links, hubs.a.names, hubs.a.groups, {}});
+  const auto seen = at_a.hubs();
+  ASSERT_EQ(seen.size(), 2u);
+  EXPECT_TRUE(seen[1].reachable);
+  EXPECT_EQ(seen[1].cost, 0u);
+  EXPECT_EQ(at_a.links()[0].cost, 0u);
+  ASSERT_EQ(seen[0].neighbours.size(), 1u);
+  EXPECT_EQ(seen[0].neighbours[0].cost, 0u);
+  for (int i = 0; i < 6; ++i) hubs.pass(milliseconds{250});
+  const std::uint16_t cost = at_a.links()[0].cost;
+  EXPECT_GE(cost, LinkCost::kLeastMeasured);
+  EXPECT_EQ(at_a.hubs()[0].neighbours[0].cost, cost);
+  EXPECT_GE(at_a.hubs()[1].cost, cost);
+  EXPECT_LT(at_a.hubs()[1].cost, LinkCost::kUnmeasured);
+}
+
 TEST(NetworkOverview, ShowsNoHubThatCouldNeverBeReached) {
   LinkedRigs hubs;
   hubs.link();

@@ -140,6 +140,20 @@ TEST(NetworkGraph, JoinsBothEndsOfALinkAtTheHigherCost) {
   EXPECT_FALSE(edges[1].agreed);
 }
 
+TEST(NetworkText, OfCostsThatAreNotMeasuredYet) {
+  std::vector<NetworkHub> hubs = some_hubs();
+  hubs[0].edges[0].cost = 0;
+  hubs[1].cost = 0;
+  EXPECT_THAT(json_of(hubs), HasSubstr("\"distance\":1,\"cost\":null,\"via\":2"));
+  EXPECT_THAT(text_of(hubs), HasSubstr("reachable    1         -     2"));
+  EXPECT_THAT(graph_json(hubs), HasSubstr("{\"a\":1,\"b\":2,\"cost\":null,\"agreed\":true}"));
+  EXPECT_THAT(graph_ascii(hubs), HasSubstr("1 lab -- 2 (-)\n"));
+  EXPECT_THAT(graph_dot(hubs), HasSubstr("1 -- 2 [label=\"-\"];"));
+  const std::vector<RouteStep> way{{1, "lab", 2, 1, 0}, {2, "hall", 2, 0, 0}};
+  EXPECT_THAT(json_of(way), HasSubstr("\"distance\":1,\"cost\":null}"));
+  EXPECT_THAT(json_of(way), HasSubstr("\"distance\":0,\"cost\":0}"));
+}
+
 TEST(NetworkGraph, IsDrawnInThreeWays) {
   EXPECT_EQ(graph_ascii(some_hubs()),
             "1 lab -- 2 (12)\n2 a\"b -- 1 (12), 3 (10, one-sided)\n"
