@@ -86,9 +86,10 @@ class Watch(Stream[Event]):
 
 @dataclass(frozen=True)
 class ConnectionEvent:
-    """What became of the connection of a node: `change` is connected, lost, resumed (nothing was lost),
+    """What became of the connection of a node: `change` is connected, lost, resumed (the session goes on),
     connected anew (what was on its way is lost) or ended (none will come any more). `why` is the cause in
-    words, `when` in seconds since 1970. `skipped` events before it went, since 64 waited."""
+    words, with the number of messages that were not sent meanwhile. `when` is in seconds since 1970. `skipped`
+    events before it went, since 64 waited."""
 
     change: str
     why: str

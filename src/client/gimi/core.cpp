@@ -29,6 +29,13 @@ std::size_t nif_bytes_max(std::size_t message_bytes_max) {
   return std::min<std::size_t>(whole, NIF_MESSAGE_BYTES_MAX);
 }
 
+/// Behind the words that the hub is back; "" if everything that was to be sent was taken.
+std::string unsent_words(std::uint64_t messages) {
+  if (messages == 0) return {};
+  return "; " + std::to_string(messages) + (messages == 1 ? " message was" : " messages were") +
+         " not sent meanwhile";
+}
+
 }  // namespace
 
 Core::Core(const NodeOptions& options)
@@ -267,10 +274,12 @@ void Core::tell(ConnectionChange change, std::string why) {
 
 void Core::on_connected(const nif_incoming& in) {
   const bool resumed = (in.flags & NIF_CONNECTED_RESUMED) != 0;
+  const std::string unsent = unsent_words(uplink_.take_unsent());
   if (resumed) {
-    tell(ConnectionChange::resumed, "the hub is back, and nothing was lost");
+    tell(ConnectionChange::resumed, "the hub is back, and the session goes on" + unsent);
   } else {
-    tell(ConnectionChange::connected_anew, "the hub is back, and what was on its way is lost");
+    tell(ConnectionChange::connected_anew,
+         "the hub is back, and what was on its way is lost" + unsent);
   }
   reception_.on_reconnected();
   streams_.on_interrupted(0);

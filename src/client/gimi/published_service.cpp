@@ -50,6 +50,7 @@ Outcome<void> PublishedService::publish(BytesView data, Timeout timeout, More mo
   } else if (!sent) {
     failure = failure_of(status, "publish " + full_name());
   }
+  if (!sent) uplink_.note_unsent(status);
   const MutexLock lock(mutex_);
   sending_ = false;
   changed_.notify_all();

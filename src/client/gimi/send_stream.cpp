@@ -76,6 +76,7 @@ Outcome<void> SendStream::send(BytesView data, const Order& order) {
   }
   if (unwatched) watch_if_needed();
   if (status == NIF_OK) return {};
+  uplink_.note_unsent(status);
   return failure;
 }
 
@@ -110,6 +111,7 @@ Outcome<SendStream::Turn> SendStream::take_turn(BytesView data, const Order& ord
     // Nobody acknowledges what was not written.
     if (std::exchange(unflushed_, false)) static_cast<void>(nif_flush(uplink_.node()));
     if (is_over(order.deadline_ns)) {
+      uplink_.note_unsent(NIF_TIMEOUT);
       return Failure{Status::timeout,
                      "not sent to " + target() +
                          ": earlier messages were not acknowledged within the time given"};

@@ -173,6 +173,18 @@ std::string Uplink::node_name() const {
   return *info.name != '\0' ? info.name : Peer{info.id}.text();
 }
 
+void Uplink::note_unsent(nif_status why) const {
+  nif::Node* const direct = direct_.load();
+  if (direct == nullptr) return;
+  const bool away =
+      why == NIF_NOT_CONNECTED || (why == NIF_TIMEOUT && direct->info().connected == 0);
+  if (away) unsent_.fetch_add(1, std::memory_order_relaxed);  // a number by itself
+}
+
+std::uint64_t Uplink::take_unsent() const {
+  return unsent_.exchange(0, std::memory_order_relaxed);  // a number by itself
+}
+
 std::string Uplink::trouble() const {
   std::string words(NIF_SENTENCE_BYTES_MAX, '\0');
   // It may be another, longer one by now.

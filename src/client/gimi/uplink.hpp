@@ -94,6 +94,11 @@ class Uplink {
 
   /// The node's name, or its id, for people.
   [[nodiscard]] std::string node_name() const;
+  /// A message was not sent, and the status says why: counted if the hub was away.
+  void note_unsent(nif_status why) const;
+  /// Messages that were not sent while the hub was away, since this was asked last.
+  [[nodiscard]] std::uint64_t take_unsent() const;
+
   /// nif_last_error(), whole.
   [[nodiscard]] std::string trouble() const;
 
@@ -107,6 +112,7 @@ class Uplink {
   std::atomic<nif_node*> node_{nullptr};
   std::atomic<nif::Node*> direct_{nullptr};
   std::atomic<std::uint32_t> pings_{0};
+  mutable std::atomic<std::uint64_t> unsent_{0};  ///< numbers by themselves: relaxed
 };
 
 }  // namespace gimnet::gimi

@@ -39,6 +39,11 @@ class Reconnected : public Conversation {
   Reconnected() : Conversation(true) {}
 };
 
+class Resumed : public Conversation {
+ protected:
+  Resumed() : Conversation(true, true) {}
+};
+
 class Lost : public Conversation {
  protected:
   static constexpr std::uint32_t kGroup = (7u << 20) | 11;
@@ -167,6 +172,27 @@ TEST_F(Reconnected, MessagesTellOverWhichConnectionTheyCame) {
     hub_.close();
     hub_ = fake_.admit(nif::test::make_welcome());
   }
+}
+
+TEST_F(Resumed, SaysHowManyMessagesWereNotSentMeanwhile) {
+  const ConnectionWatch connection = node_->watch_connection().or_throw();
+  EXPECT_EQ(connection.receive()->change, ConnectionChange::connected);
+  const Sender stream = sender(0);
+  const auto words_after = [&](bool resumed, int unsent) {
+    hub_.close();
+    EXPECT_EQ(connection.receive()->change, ConnectionChange::lost);
+    for (; unsent > 0; --unsent) EXPECT_FALSE(stream.send("x", Timeout{1}));
+    proto::Welcome welcome = nif::test::make_welcome(1u << 20);
+    welcome.resumed = resumed;
+    hub_ = fake_.admit(welcome);
+    return connection.receive().or_throw().why;
+  };
+  const std::string lost = "the hub is back, and what was on its way is lost";
+  const std::string goes_on = "the hub is back, and the session goes on";
+  EXPECT_EQ(words_after(false, 0), lost);
+  EXPECT_EQ(words_after(true, 54), goes_on + "; 54 messages were not sent meanwhile");
+  EXPECT_EQ(words_after(false, 1), lost + "; 1 message was not sent meanwhile");
+  EXPECT_EQ(words_after(true, 0), goes_on) << "they were told of";
 }
 
 TEST_F(Lost, MessagesAreCountedByWhy) {

@@ -36,12 +36,14 @@ struct Taken {
 
 class Conversation : public testing::Test {
  protected:
-  explicit Conversation(bool reconnect = false) {
+  /// `resume`: its session goes on after a break, if the hub says so.
+  explicit Conversation(bool reconnect = false, bool resume = false) {
     NodeOptions options;
     options.hub = fake_.url();
     options.reconnect = reconnect;
+    if (resume) options.resume = true;
     std::thread joiner([&] { node_.emplace(Node::join(options).or_throw()); });
-    hub_ = fake_.admit(nif::test::make_welcome());
+    hub_ = fake_.admit(nif::test::make_welcome(resume ? 1u << 20 : 0));
     joiner.join();
   }
   ~Conversation() override { hub_.close(); }
