@@ -11,11 +11,8 @@ namespace {
 
 using namespace gimnet::tool;
 
-ExitCode run(const ToolOptions& options) {
-  StopSignal stop;
-  if (options.command == Command::impair) return run_impair(options.impair, stop);
-  ToolSession session(options, stop);
-  switch (options.command) {
+ExitCode run_command(ToolSession& session) {
+  switch (session.options().command) {
     case Command::send:
       return run_send(session);
     case Command::recv:
@@ -58,6 +55,16 @@ ExitCode run(const ToolOptions& options) {
       break;
   }
   return ExitCode::usage;
+}
+
+ExitCode run(const ToolOptions& options) {
+  StopSignal stop;
+  if (options.command == Command::impair) return run_impair(options.impair, stop);
+  ToolSession session(options, stop);
+  const ExitCode code = run_command(session);
+  session.output().flush();
+  stop.leave(static_cast<int>(code));
+  return code;
 }
 
 /// Help goes to standard output, what is wrong to standard error.

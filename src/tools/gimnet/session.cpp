@@ -69,11 +69,13 @@ NodeOptions ToolSession::options_for(NodeOptions how) const {
 }
 
 std::optional<ExitCode> ToolSession::join(NodeOptions how) {
+  stop_.end_at_once();
   return settle(Node::join(options_for(std::move(how))));
 }
 
 std::optional<ExitCode> ToolSession::join_to_look(NodeOptions how) {
   how = options_for(std::move(how));
+  stop_.end_at_once();
   auto joined = Node::join(how);
   if (joined || !joined.is(Status::refused)) return settle(std::move(joined));
   how.administrator = true;

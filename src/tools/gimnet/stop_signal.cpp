@@ -49,19 +49,27 @@ StopSignal::~StopSignal() {
 
 void StopSignal::watch() {
   const sigset_t set = watched_signals();
-  for (int signal = 0; sigwait(&set, &signal) == 0 && signal != kEndWatcher;) {
-    {
-      const MutexLock lock(mutex_);
-      // Of a terminal that goes one may hear twice, from the shell and from the kernel.
-      if (signal_ != 0 && signal == SIGHUP) continue;
-      if (signal_ != 0) ::_exit(kSignalExitBase + signal);
-      signal_ = signal;
-      changed_.notify_all();
-    }
-    static_cast<void>(::eventfd_write(descriptor_, 1));
+  for (int signal = 0; sigwait(&set, &signal) == 0 && signal != kEndWatcher;) take(signal);
+}
+
+void StopSignal::take(int signal) {
+  {
+    const MutexLock lock(mutex_);
+    // Of a terminal that goes one may hear twice, from the shell and from the kernel.
+    if (signal_ != 0 && signal == SIGHUP) return;
+    if (signal_ != 0 || ends_at_once_) ::_exit(kSignalExitBase + signal);
+    signal_ = signal;
+    taken_ns_ = steady_now_ns();
+    changed_.notify_all();
+  }
+  static_cast<void>(::eventfd_write(descriptor_, 1));
+  {
     const MutexLock lock(action_mutex_);
     if (action_) std::exchange(action_, nullptr)();
   }
+  const MutexLock lock(mutex_);
+  is_over_ = true;
+  changed_.notify_all();
 }
 
 int StopSignal::signal() {
@@ -78,7 +86,26 @@ bool StopSignal::wait_until(std::int64_t deadline_ns) {
   return false;
 }
 
+void StopSignal::end_at_once() {
+  const MutexLock lock(mutex_);
+  if (signal_ != 0) ::_exit(kSignalExitBase + signal_);
+  ends_at_once_ = true;
+}
+
+void StopSignal::leave(int code) {
+  const MutexLock lock(mutex_);
+  if (signal_ == 0) return;
+  const std::int64_t deadline_ns = taken_ns_ + kPatienceNs;
+  while (!is_over_ && steady_now_ns() < deadline_ns)
+    static_cast<void>(changed_.wait_until(mutex_, deadline_ns));
+  if (!is_over_) ::_exit(code);
+}
+
 void StopSignal::on_stop(std::function<void()> action) {
+  {
+    const MutexLock lock(mutex_);
+    ends_at_once_ = false;
+  }
   const bool late = signal() != 0;
   const MutexLock lock(action_mutex_);
   action_ = std::move(action);

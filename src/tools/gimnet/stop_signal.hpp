@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <thread>
 
@@ -9,10 +10,14 @@ namespace gimnet::tool {
 
 /// Ctrl-C, SIGTERM and the end of the terminal (SIGHUP, unless it was ignored before, as nohup
 /// does), turned into a request to stop: waits end, and the program can leave the hub in good
-/// order. A second Ctrl-C or SIGTERM ends it at once. One for a program, made before any other
-/// thread. Thread safety: any thread.
+/// order, for which it has kPatienceNs. A second Ctrl-C or SIGTERM ends it at once. One for a
+/// program, made before any other thread. Thread safety: any thread.
 class StopSignal {
  public:
+  /// A hub that works takes a goodbye within some milliseconds. The user waits 200 ms at most, also
+  /// on a busy machine.
+  static constexpr std::int64_t kPatienceNs = 100'000'000;
+
   StopSignal();
   ~StopSignal();
   StopSignal(const StopSignal&) = delete;
@@ -24,11 +29,17 @@ class StopSignal {
   [[nodiscard]] int descriptor() const { return descriptor_; }
   /// Waits until steady_now_ns() reaches `deadline_ns`. False: a signal came before.
   [[nodiscard]] bool wait_until(std::int64_t deadline_ns) GIMNET_EXCLUDES(mutex_);
+  /// Until on_stop() is called, a signal ends the program at once: it has nothing to leave.
+  void end_at_once() GIMNET_EXCLUDES(mutex_);
   /// Called once, on another thread, when a signal comes; an empty one takes the last away.
   void on_stop(std::function<void()> action) GIMNET_EXCLUDES(mutex_, action_mutex_);
+  /// After a signal, returns when the action is over. Ends the program with that code if that is
+  /// later than kPatienceNs after the signal.
+  void leave(int code) GIMNET_EXCLUDES(mutex_);
 
  private:
   void watch();
+  void take(int signal) GIMNET_EXCLUDES(mutex_);
 
   int descriptor_ = -1;
   std::thread watcher_;
@@ -37,6 +48,9 @@ class StopSignal {
   Mutex mutex_;
   Condition changed_;
   int signal_ GIMNET_GUARDED_BY(mutex_) = 0;
+  std::int64_t taken_ns_ GIMNET_GUARDED_BY(mutex_) = 0;
+  bool ends_at_once_ GIMNET_GUARDED_BY(mutex_) = false;
+  bool is_over_ GIMNET_GUARDED_BY(mutex_) = false;  ///< the action was called
 };
 
 }  // namespace gimnet::tool
