@@ -15,7 +15,7 @@ import tempfile
 import unittest
 
 from support.documents import programs_of_the_readme
-from support.processes import BIN, ROOT, Hub, Process, run_gimnet, start_gimnet
+from support.processes import BIN, ROOT, TCPHUB, Hub, Process, run_gimnet, start_gimnet
 from support.waiting import wait_until
 
 BUILD = BIN.parent
@@ -61,6 +61,13 @@ def lines_of(page, text):
 
 def all_lines():
     return [line for page, text in pages().items() for line in lines_of(page, text)]
+
+
+def second_hub_of_the_readme():
+    """The words of each line that links a second hub."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    block = re.search(r"^Link a second hub[^\n]*\n\n((?:    [^\n]*\n)+)", text, re.M)[1]
+    return [shlex.split(line, comments=True) for line in block.splitlines()]
 
 
 class Documented(unittest.TestCase):
@@ -158,6 +165,25 @@ class Documented(unittest.TestCase):
         self.assertIsNone(publisher.popen.poll(), publisher.err)
         self.assertEqual(run_gimnet(f"unix:{hub.socket_path}", "ctl", "kick", "robot").code, 0)
         self.assertEqual(publisher.wait(), 0, publisher.err)
+
+    def test_the_second_hub_of_the_readme_links_and_its_end_is_told(self):
+        start, link, look = second_hub_of_the_readme()
+        url = "tcp://127.0.0.1:7451"
+        self.assertEqual((start[0], link[0], look), ("tcphub", "gimnet", ["gimnet", "watch"]))
+        first = Hub(self, hub_id=None)
+        words = [TCPHUB, *start[1:], "--state-dir", self.folder / "second"]
+        second = Process(["tcp://127.0.0.1:0" if word == url else word for word in words])
+        self.addCleanup(second.end)
+        wait_until(lambda: second.out.endswith(b"\n"), f"the second hub is ready; it said: {second.err}")
+        real = second.out.decode().split()[1]
+        self.assertIn(url, link)
+        watch = start_gimnet(self, first, *look[1:])
+        wait_until(lambda: "nothing is there yet" in watch.err, "the watch has begun")
+        linked = run_gimnet(f"unix:{first.socket_path}", *[real if word == url else word for word in link[1:]])
+        self.assertEqual(linked.code, 0, linked.err)
+        wait_until(lambda: b"  reachable    hub 2 hub-2\n" in watch.out, f"the hub that came; the watch said {watch.out}")
+        second.signal(9)
+        wait_until(lambda: b"  unreachable  hub 2 hub-2\n" in watch.out, f"the hub that went; the watch said {watch.out}")
 
     def test_gimi_takes_what_the_c_example_of_nif_sends(self):
         text = (ROOT / "docs" / "nif.md").read_text(encoding="utf-8")

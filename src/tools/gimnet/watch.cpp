@@ -119,21 +119,29 @@ bool ToolFilter::hides(const WatchEvent& event) {
 }
 
 std::vector<NetworkHub> HubWays::take(const std::vector<NetworkHub>& hubs) {
+  std::map<std::uint32_t, NetworkHub> now;
+  for (const NetworkHub& hub : hubs) now[hub.hub_id] = hub;
+  const auto before = std::exchange(known_, now);
+  if (!before) return {};
   std::vector<NetworkHub> changed;
-  std::map<std::uint32_t, bool> reachable;
-  for (const NetworkHub& hub : hubs) {
-    reachable[hub.hub_id] = hub.reachable;
-    const auto before = reachable_.find(hub.hub_id);
-    if (before != reachable_.end() && before->second != hub.reachable) changed.push_back(hub);
+  for (const auto& [id, hub] : now) {
+    const auto former = before->find(id);
+    const bool was_reachable = former != before->end() && former->second.reachable;
+    if (was_reachable != hub.reachable) changed.push_back(hub);
   }
-  reachable_ = std::move(reachable);
+  for (auto [id, hub] : *before) {
+    if (now.contains(id) || !hub.reachable) continue;
+    hub.reachable = false;
+    changed.push_back(hub);
+  }
   return changed;
 }
 
 std::string_view HubWays::standing_of(const NodeRecord& node) const {
   if (node.connected) return "connected";
-  const auto hub = reachable_.find(node.hub_id);
-  return hub == reachable_.end() || hub->second ? "away" : kUnreachable;
+  if (!known_) return "away";
+  const auto hub = known_->find(node.hub_id);
+  return hub == known_->end() || hub->second.reachable ? "away" : kUnreachable;
 }
 
 std::string WatchMemory::take(const WatchEvent& event) {
@@ -234,14 +242,15 @@ class WatchPrinter {
   }
 
   /// Once a second, asks for ways to hubs, of which a watch does not tell, and prints those that
-  /// came or went for the nodes and services seen. `now_ns`: steady_now_ns().
+  /// came or went: all of them, or with a pattern those of the nodes and services seen. `now_ns`:
+  /// steady_now_ns().
   void look_at_hubs(std::int64_t now_ns) {
     if (now_ns < next_look_ns_ || !session_.node().state().connected) return;
     next_look_ns_ = now_ns + 1'000'000'000;
     const auto hubs = session_.node().hubs(ConnectionWatch::kPeriod);
     if (!hubs) return;
     for (const NetworkHub& hub : ways_.take(*hubs)) {
-      if (!hubs_.contains(hub.hub_id)) continue;
+      if (!session_.options().target.empty() && !hubs_.contains(hub.hub_id)) continue;
       session_.output().write(session_.options().json
                                   ? json_line(hub, wall_now_ns())
                                   : text_line(hub, wall_now_ns(), session_.paint()));

@@ -27,17 +27,18 @@ class ToolFilter {
   std::set<std::uint32_t> hidden_;  ///< the last event of a node tells no more than its id
 };
 
-/// To which hubs of the network there is a way. Thread safety: one thread. Memory: an id for each
-/// hub.
+/// To which hubs of the network there is a way. Thread safety: one thread. Memory: a record for
+/// each hub.
 class HubWays {
  public:
-  /// Those of `hubs` to which a way came or went since the last call; a new one is none of them.
+  /// Those to which a way came or went since the last call, among them new ones and those that are
+  /// no longer listed; the first call tells of none.
   [[nodiscard]] std::vector<NetworkHub> take(const std::vector<NetworkHub>& hubs);
   /// As ToolSession::standing_of(), by the last call of take().
   [[nodiscard]] std::string_view standing_of(const NodeRecord& node) const;
 
  private:
-  std::map<std::uint32_t, bool> reachable_;
+  std::optional<std::map<std::uint32_t, NetworkHub>> known_;  ///< nothing: not asked yet
 };
 
 /// The last words of a watch about each node and service, so that a line can say what changed.

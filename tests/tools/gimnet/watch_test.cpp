@@ -96,6 +96,28 @@ TEST(WatchReport, OfWaysToHubs) {
                                "\n");
 }
 
+TEST(HubWays, TellHubsThatComeOrGo) {
+  HubWays ways;
+  NetworkHub own;
+  own.hub_id = 1;
+  own.reachable = true;
+  NetworkHub other = own;
+  other.hub_id = 2;
+  other.name = "lab";
+  EXPECT_TRUE(ways.take({own}).empty()) << "it was there before";
+  const auto came = ways.take({own, other});
+  ASSERT_EQ(came.size(), 1u);
+  EXPECT_EQ(came[0].hub_id, 2u);
+  EXPECT_TRUE(came[0].reachable);
+  const auto went = ways.take({own});
+  ASSERT_EQ(went.size(), 1u) << "it is not listed any more";
+  EXPECT_EQ(went[0].name, "lab");
+  EXPECT_FALSE(went[0].reachable);
+  other.reachable = false;
+  EXPECT_TRUE(ways.take({own, other}).empty()) << "there was no way to it before";
+  EXPECT_TRUE(ways.take({own}).empty());
+}
+
 TEST(WatchReport, KnowsWhatWasThereBefore) {
   EXPECT_TRUE(is_snapshot(Change::snapshot_begins));
   EXPECT_TRUE(is_snapshot(Change::present));
