@@ -32,7 +32,7 @@ class Sending(unittest.TestCase):
     def test_a_service_that_a_node_does_not_have(self):
         send = run_gimnet(self.hub, "send", "bot/driv", data=b"one\n")
         self.assertEqual(send.code, NOT_FOUND, send.err)
-        self.assertIn("there is no node 'bot/driv', and the node 'bot' has no service 'driv'; did you mean bot/drive?",
+        self.assertIn("there is no service 'bot/driv': the node 'bot' has none of that name; did you mean bot/drive?",
                       send.err)
 
     def test_no_node_gets_the_name_of_a_service(self):

@@ -82,8 +82,8 @@ CommandEnding unknown_command(std::string_view word) {
   }
   std::array<std::string_view, kCommands.size()> names;
   for (std::size_t i = 0; i < names.size(); ++i) names[i] = kCommands[i].first;
-  // Other tools have these as commands.
-  const bool is_option = word == "help" || word == "version";
+  // Other tools have this as a command.
+  const bool is_option = word == "version";
   const std::string nearest =
       is_option ? "; did you mean --" + std::string(word) + "?" : did_you_mean(word, names);
   return wrong("there is no command '" + std::string(word) + "'" + nearest, {});
@@ -300,6 +300,16 @@ std::string explained(const CLI::ParseError& error,
   return "'" + given.back() + "' is no value for " + name + ": " + takes;
 }
 
+/// `gimnet help` is `gimnet --help`, and `gimnet help COMMAND` is `gimnet COMMAND --help`.
+std::variant<ToolOptions, CommandEnding> help_of(std::span<const char* const> arguments,
+                                                 std::string_view help) {
+  std::vector<const char*> words(arguments.begin(), arguments.end());
+  std::erase_if(words, [&](const char* word) { return word == help.data(); });
+  if (std::ranges::find(words, std::string_view{"--help"}) == words.end())
+    words.push_back("--help");
+  return parse_command_line(static_cast<int>(words.size()), words.data());
+}
+
 }  // namespace
 
 std::variant<ToolOptions, CommandEnding> parse_command_line(int argc, const char* const* argv) {
@@ -308,6 +318,7 @@ std::variant<ToolOptions, CommandEnding> parse_command_line(int argc, const char
   add_commands(app, options);
   const std::span arguments(argv, static_cast<std::size_t>(argc));
   const Called called = called_by(arguments.subspan(arguments.empty() ? 0 : 1));
+  if (called.command == "help") return help_of(arguments, called.command);
   const auto* known = kCommands.begin();
   while (known != kCommands.end() && known->first != called.command) ++known;
   if (!called.command.empty() && known == kCommands.end()) {

@@ -116,8 +116,11 @@ std::optional<Peer> ToolSession::find(std::string_view name) {
   }
   Failure failure = peer.failure();
   if (failure.status == Status::not_found) {
-    failure.sentence = "there is no node '" + std::string(name) + "'";
-    failure.sentence += words_for_no_node(name);
+    const bool sends = options_.command == Command::send;  // mostly to services
+    failure.sentence =
+        sends && name.find('/') != std::string_view::npos
+            ? words_for_no_service(name)
+            : "there is no node '" + std::string(name) + "'" + words_for_no_node(name);
   }
   code_ = fail(failure);
   return std::nullopt;
@@ -136,6 +139,14 @@ std::string ToolSession::words_for_no_node(std::string_view name) {
     return id_words(name) + nearest_name("node", name);
   return ", and the node '" + std::string(name.substr(0, slash)) + "' has no service '" +
          std::string(name.substr(slash + 1)) + "'" + nearest_name("service", name);
+}
+
+std::string ToolSession::words_for_no_service(std::string_view name) {
+  const std::string node(name.substr(0, name.rfind('/')));
+  return "there is no service '" + std::string(name) + "'" +
+         (is_listed(node) ? ": the node '" + node + "' has none of that name"
+                          : ", and no node '" + node + "'") +
+         nearest_name("service", name);
 }
 
 void ToolSession::tell_if_away(std::string_view name) {

@@ -117,6 +117,8 @@ class ToolSession {
   /// Words beside "there is no node": the service of that name, the node before the slash, or
   /// the nearest name.
   [[nodiscard]] std::string words_for_no_node(std::string_view name);
+  /// That there is neither a node nor a service of that name, which has a slash.
+  [[nodiscard]] std::string words_for_no_service(std::string_view name);
   void tell_if_away(std::string_view name);
   [[nodiscard]] bool is_listed(std::string_view name);
   /// Of a word that is a number: how an id is written; "" of any other.

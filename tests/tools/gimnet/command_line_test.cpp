@@ -32,6 +32,22 @@ std::string refusal(std::initializer_list<const char*> words) {
   return ending->text;
 }
 
+std::string shown(std::initializer_list<const char*> words) {
+  const auto parsed = parse(words);
+  const auto* ending = std::get_if<CommandEnding>(&parsed);
+  if (ending == nullptr || ending->code != ExitCode::done) return "not shown";
+  return ending->text;
+}
+
+TEST(CommandLine, HelpIsACommandToo) {
+  EXPECT_EQ(shown({"help"}), shown({"--help"}));
+  EXPECT_EQ(shown({"help", "--help"}), shown({"--help"}));
+  EXPECT_EQ(shown({"help", "ping"}), shown({"ping", "--help"}));
+  EXPECT_EQ(shown({"--hub", "x", "help", "ctl", "kick"}), shown({"ctl", "kick", "--help"}));
+  EXPECT_NE(shown({"help", "ping"}), shown({"help"}));
+  EXPECT_NE(refusal({"help", "pnig"}).find("did you mean ping?"), std::string::npos);
+}
+
 TEST(CommandLine, TakesCommonOptionsBeforeAndAfterTheCommand) {
   for (const ToolOptions& read :
        {options({"--hub", "tcp://h:1", "--json", "--shard", "1", "nodes"}),
@@ -114,7 +130,6 @@ TEST(CommandLine, SuggestsWhatANewcomerMeant) {
     const std::string text = refusal(words);
     EXPECT_NE(text.find(part), std::string::npos) << text;
   };
-  said({"help"}, "there is no command 'help'; did you mean --help?");
   said({"version"}, "did you mean --version?");
   said({"--hbu", "x", "status"}, "there is no option --hbu for gimnet; did you mean --hub?");
   said({"--colour", "never", "status"},
