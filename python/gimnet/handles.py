@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import ctypes
 import math
+import numbers
 import os
 import select
 import threading
@@ -23,8 +24,9 @@ Raw = TypeVar("Raw", bound=ctypes.Structure)
 
 def to_ms(seconds: float) -> int:
     """Milliseconds for the options of a call, at least 1. 0 would be the library's default."""
-    if not isinstance(seconds, (int, float)):
+    if not isinstance(seconds, numbers.Real):
         raise TypeError(f"a time is a number of seconds, and this is a {type(seconds).__name__}")
+    seconds = float(seconds)  # a number of numpy, which would round what is added to it
     if not 0 <= seconds <= TIMEOUT_MS_MAX / 1000:
         raise errors.BadArgument(f"a time of {seconds} s: use 0 to {TIMEOUT_MS_MAX // 1000}")
     return max(1, round(seconds * 1000))
@@ -34,7 +36,7 @@ def check_time(timeout: Optional[float]) -> None:
     """A time that is none is told also if nothing has to be waited for."""
     if timeout is None:
         return
-    if not isinstance(timeout, (int, float)):
+    if not isinstance(timeout, numbers.Real):
         raise TypeError(f"a time is a number of seconds, or None for no limit, and this is a {type(timeout).__name__}")
     if not timeout >= 0:
         raise errors.BadArgument(f"a time of {timeout} s: use 0 or more, or None for no limit")
@@ -43,7 +45,7 @@ def check_time(timeout: Optional[float]) -> None:
 def end_of(timeout: Optional[float]) -> float:
     """The time at which a wait of so many seconds ends; None: never."""
     check_time(timeout)
-    return math.inf if timeout is None else time.monotonic() + timeout
+    return math.inf if timeout is None else time.monotonic() + float(timeout)
 
 
 def left_ms(end: float, most: int) -> int:

@@ -383,14 +383,15 @@ class Node(Waitable):
         return messages.taken(raw)
 
 
-def connect(name: str = "", *, hub: str = "", description: str = "", timeout: float = 5.0, wait_for_hub: bool = False,
-            number_if_taken: bool = False, message_bytes_max: int = 0) -> Node:
+def connect(name: str = "", *, hub: str = "", description: str = "", timeout: float = 5.0,
+            wait_for_hub: Union[bool, float] = False, number_if_taken: bool = False, message_bytes_max: int = 0) -> Node:
     """Joins the network under that name, or without one. `hub`: `tcp://host:port` or `unix:/path`; "":
-    GIMNET_HUB, else the hub of this machine. `number_if_taken`: else as NAME-2 ... NAME-99.
-    `message_bytes_max`: of the largest message that it takes, 0: 64 MiB, at most 1 GiB. NoHub, NameTaken,
-    BadName, Timeout, ..."""
+    GIMNET_HUB, else the hub of this machine. `wait_for_hub`: dials again until there is a hub, for so many
+    seconds; True: for `timeout`. `number_if_taken`: else as NAME-2 ... NAME-99. `message_bytes_max`: of the
+    largest message that it takes, 0: 64 MiB, at most 1 GiB. NoHub, NameTaken, BadName, Timeout, ..."""
+    within = wait_for_hub if wait_for_hub and not isinstance(wait_for_hub, bool) else timeout
     options = sized(_c.gimi_node_options, name=to_text(name), hub=to_text(hub), description=to_text(description),
-                     timeout_ms=to_ms(timeout), wait_for_hub=wait_for_hub, number_if_taken=number_if_taken,
+                     timeout_ms=to_ms(within), wait_for_hub=bool(wait_for_hub), number_if_taken=number_if_taken,
                      message_bytes_max=message_bytes_max)
     handle = ctypes.c_uint64()
     interruptible(lambda: errors.check(_c.lib.gimi_join(options, handle)), lambda: _close(handle))

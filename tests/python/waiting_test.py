@@ -2,6 +2,7 @@
 """Waiting in Python: with a WaitSet, by descriptors in other loops, and what ends it."""
 
 import asyncio
+import fractions
 import os
 import pathlib
 import select
@@ -135,6 +136,25 @@ class Waiting(TwoNodes):
                     waits.wait(0)
             else:
                 self.assert_readable(subscription, False)
+
+    def test_any_real_number_is_a_time(self):
+        publisher, subscription = self.pair("pose")
+        for wait in (1, 0.001, fractions.Fraction(1, 1000)):
+            begun = time.monotonic()
+            with self.assertRaises(gimnet.NoHub):
+                gimnet.connect(hub="unix:/none", wait_for_hub=wait, timeout=PATIENCE_S)
+            self.assertGreaterEqual(time.monotonic() - begun, wait)
+            with self.assertRaises(gimnet.Timeout):
+                subscription.receive(wait)
+        gimnet.connect(hub=self.hub.url, wait_for_hub=PATIENCE_S, timeout=0.0).close()
+        gimnet.connect(hub=self.hub.url, wait_for_hub=0.0).close()
+        minute = fractions.Fraction(60)
+        self.robot.advertise("a", age_max=minute, timeout=minute)
+        self.robot.subscribe("x/y", silence=minute, timeout=minute)
+        publisher.wait_for_subscribers(timeout=minute)
+        for wrong in ("1", None):
+            with self.assertRaises(TypeError):
+                self.robot.nodes(timeout=wrong)
 
     def test_silence_ends_a_wait(self):
         subscription = self.viewer.subscribe("robot/nothing", silence=0.02)
