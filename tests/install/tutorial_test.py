@@ -7,6 +7,7 @@ each program built by the line of its page. The programs of one language have pa
 import os
 import pathlib
 import re
+import signal
 import subprocess
 import sys
 import tempfile
@@ -93,6 +94,29 @@ class Tutorial(unittest.TestCase):
             self.assertEqual(sorted(page.shown), ["ask", "drive", "newest", "view"], language)
             for name, text in page.programs.items():
                 self.assertLessEqual(len(text.splitlines()), LINES_MAX, f"{language}: {name}")
+
+    def test_without_a_hub_each_says_so(self):
+        hub = Hub(self)
+        hub.process.end()
+        for language in ENDINGS:
+            for name in PROGRAMS:
+                with self.subTest(language, program=name):
+                    program = self.start(hub, language, name)
+                    self.assertEqual(program.wait(), 1)
+                    said = program.out.decode() + program.err
+                    self.assertIn(f"cannot connect to {hub.url}", said)
+                    self.assertNotIn("terminate called", said)
+
+    def test_ctrl_c_ends_those_in_python_without_a_word(self):
+        hub = Hub(self)
+        goes_on = [name for name in PROGRAMS if name not in ("ask", "drive")]
+        for name in goes_on:
+            with self.subTest(name):
+                program = self.start(hub, "python", name)
+                wait_until(lambda: len(hub.nodes()) == 1, f"it is there; {program.err}")
+                program.signal(signal.SIGINT)
+                self.assertEqual((program.wait(), program.err), (0, ""))
+                wait_until(lambda: not hub.nodes(), "it is gone")
 
     def test_what_shows_python_is_python(self):
         pages = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")]
