@@ -47,6 +47,11 @@ class BegunMessage : public gimi::test::Conversation {
     parts.fragment = proto::FragmentHeader{++number_, 0, 65u << 20};
     hub_.send(parts, payload.append(1000, 'x'));
   }
+  /// The first message of the node, which answers a PING behind all.
+  gimi::test::Taken first_word() {
+    answer({1, MessageOperation::ping, 0, 0, kEpoch}, {});
+    return next();
+  }
   static std::span<const std::byte> bytes(const std::string& text) {
     return std::as_bytes(std::span(text));
   }
@@ -56,7 +61,7 @@ class BegunMessage : public gimi::test::Conversation {
 
 TEST_F(BegunMessage, OfAServiceIsRefusedByAnErrorWithTheWordsOfItsReceiver) {
   begin(MessageOperation::data);
-  const auto error = next();
+  const auto error = first_word();
   EXPECT_EQ(error.header.operation, MessageOperation::error);
   EXPECT_EQ(error.header.sequence, kSequence);
   EXPECT_EQ(error.header.epoch, kEpoch);
@@ -71,7 +76,7 @@ TEST_F(BegunMessage, OfAServiceIsRefusedByAnErrorWithTheWordsOfItsReceiver) {
 
 TEST_F(BegunMessage, OfARequestIsRefusedByItsFault) {
   begin(MessageOperation::request);
-  const auto error = next();
+  const auto error = first_word();
   EXPECT_EQ(error.header.operation, MessageOperation::error);
   EXPECT_EQ(error.header.sequence, kSequence);
   EXPECT_EQ(error.header.epoch, kEpoch);
@@ -83,9 +88,8 @@ TEST_F(BegunMessage, OfARequestIsRefusedByItsFault) {
 TEST_F(BegunMessage, OfNoKnownSortIsNotAnswered) {
   begin(static_cast<MessageOperation>(200));
   begin(MessageOperation::pong);
-  begin(MessageOperation::request);
-  EXPECT_EQ(next().header.operation, MessageOperation::error) << "of the last one alone";
-  EXPECT_EQ(node_->lost().too_large, 3u);
+  EXPECT_EQ(first_word().header.operation, MessageOperation::pong);
+  EXPECT_EQ(node_->lost().too_large, 2u);
 }
 
 /// Two nodes, of which one takes messages of at most 1 MiB.
