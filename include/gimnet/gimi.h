@@ -170,8 +170,9 @@ GIMNET_API gimi_status gimi_sender(gimi_handle node, gimi_peer to, const gimi_se
 /** Sends 0 bytes to 1 GiB. GIMI_OK: it is on its way; of a synchronized stream, gimi_settle() and
  * gimi_sent() tell what became of it. Waits while the window is full (GIMI_WAIT) or the hub has
  * paused the destination. `more` as in gimi_publish(). GIMI_TIMEOUT (nothing was sent),
- * GIMI_WINDOW_FULL, GIMI_NOT_FOUND (a service that nobody has), GIMI_NOT_CONNECTED, GIMI_REFUSED,
- * GIMI_NOT_DELIVERED (also of end_at_loss: nothing was sent), GIMI_TOO_LARGE. */
+ * GIMI_WINDOW_FULL, GIMI_NOT_FOUND (a service that nobody has, or that is away),
+ * GIMI_NOT_CONNECTED, GIMI_REFUSED, GIMI_NOT_DELIVERED (also of end_at_loss: nothing was sent),
+ * GIMI_TOO_LARGE. */
 GIMNET_API gimi_status gimi_send(gimi_handle sender, const void* data, size_t size,
                                  int32_t timeout_ms, int32_t more);
 /** gimi_send(), and waits for the acknowledgement of this one message, which has its place among

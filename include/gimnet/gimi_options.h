@@ -97,11 +97,13 @@ typedef struct gimi_send_options {
    */
   uint32_t window;
   gimi_at_full_window at_full;
-  uint32_t age_ms_max; /**< Not 0: dropped on the way when older, by the clocks of the hubs. */
-  uint8_t timestamp;   /**< Not 0: tell the receiver when it was sent: 8 bytes more. */
-  uint8_t end_at_loss; /**< Not 0: of a synchronized stream, once a message was lost, nothing more
-                          is sent. */
-  uint8_t reserved[6];
+  uint32_t age_ms_max;  /**< Not 0: dropped on the way when older, by the clocks of the hubs. */
+  uint8_t timestamp;    /**< Not 0: tell the receiver when it was sent: 8 bytes more. */
+  uint8_t end_at_loss;  /**< Not 0: of a synchronized stream, once a message was lost, nothing more
+                           is sent. */
+  uint8_t wait_if_away; /**< Not 0: gimi_send() waits, within its time, for a service that is away.
+                           0: it answers GIMI_NOT_FOUND at once. Of this sender alone. */
+  uint8_t reserved[5];
 } gimi_send_options;
 
 typedef struct gimi_publish_options {

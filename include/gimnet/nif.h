@@ -388,10 +388,11 @@ typedef enum nif_incoming_type {
    * went, and once when it was declared again after a break. */
   NIF_SUBSCRIBERS = 6,
   /** A service that this node subscribed changed: it appeared, has another provider or group
-   * id, or went [text: full name, group (0: none; with a reason, nif_status: the hub refused the
-   * subscription after a break, payload: its words), from: its provider (0: nobody), count: the
-   * provider's session, message_type, instance, delivery, direction]. Comes before the first
-   * message of another group, also after a break; messages of former groups may still come. */
+   * id, is away or there again, or went [flags: NIF_SERVICE_AWAY, text: full name, group (0: none;
+   * with a reason, nif_status: the hub refused the subscription after a break, payload: its words),
+   * from: its provider (0: nobody), count: the provider's session, message_type, instance,
+   * delivery, direction]. Comes before the first message of another group, also after a break;
+   * messages of former groups may still come. */
   NIF_SERVICE_MOVED = 8,
   /** An own service got another group id after a reconnect [text: service name, former_group, group
    * (0: the hub refused it; reason: nif_status; payload: its words)]. Send to the new id from now
@@ -412,6 +413,12 @@ enum {
   NIF_CONNECTED_RESUMED =
       0x01, /**< The counts went on: nothing was lost except what NIF_GAPs say. */
   NIF_CONNECTED_SAME_ID = 0x02 /**< The node has its former id. */
+};
+/** Bits of nif_incoming.flags of a NIF_SERVICE_MOVED. */
+enum {
+  /** The service takes data (NIF_ACCEPTS), and its node has lost its connection and not advertised
+     it again yet: what is sent there may be dropped. */
+  NIF_SERVICE_AWAY = 0x01
 };
 /** Bits of nif_incoming.flags of a NIF_DISCONNECTED. */
 enum {

@@ -95,7 +95,7 @@ class gimi_subscribe_options(ctypes.Structure):
 class gimi_send_options(ctypes.Structure):
     _fields_ = [("struct_size", c_size_t), ("key", gimi_key), ("lane", c_int32), ("window", c_uint32),
                 ("at_full", c_int32), ("age_ms_max", c_uint32), ("timestamp", c_uint8), ("end_at_loss", c_uint8),
-                ("reserved", c_uint8 * 6)]
+                ("wait_if_away", c_uint8), ("reserved", c_uint8 * 5)]
 
 
 class gimi_publish_options(ctypes.Structure):

@@ -193,7 +193,7 @@ class Node(Waitable):
 
     def __init__(self, handle: int) -> None:
         super().__init__(handle)
-        self._senders: Dict[Tuple[Union[str, Peer], str], int] = {}
+        self._senders: Dict[Tuple[Union[str, Peer], str, bool], int] = {}
         self._asked: Set[str] = set()  # services, of which the library knows the place
         Exit.add(handle, self)
 
@@ -275,12 +275,13 @@ class Node(Waitable):
         return Source(self, self._opened(_c.lib.gimi_accept, to_text(name), options), kept=True)
 
     def send(self, to: Union[str, Peer], value: Any, timeout: float = 1.0, *, lane: str = "normal",
-             confirm: bool = False) -> None:
+             confirm: bool = False, wait_if_away: bool = False) -> None:
         """Sends to the service of that full name, or to a Peer of find(). `lane`: as of advertise(), and
         the same each time. It does not tell if the message is lost on its way. With `confirm` it waits until the
-        receiver has the message in its queue. NotFound, Timeout (not sent, or not confirmed: it may still arrive),
-        NotConnected, NotDelivered (why it is lost, or may be), TooLarge, BadArgument."""
-        sender = self._sender(to, lane, timeout)
+        receiver has the message in its queue. `wait_if_away`: it waits for a service that is away. NotFound (also of
+        one that is away), Timeout (not sent, or not confirmed: it may still arrive), NotConnected, NotDelivered (why it
+        is lost, or may be), TooLarge, BadArgument."""
+        sender = self._sender(to, lane, wait_if_away, timeout)
         data, size, keeps = messages.payload(value)
         if not confirm and size <= _PIECES_BYTES_MAX:
             status = in_pieces(timeout, lambda ms: _c.lib.gimi_send(sender, data, size, ms, 0))
@@ -296,13 +297,14 @@ class Node(Waitable):
 
         interruptible(call)
 
-    def _sender(self, to: Union[str, Peer], lane: str, timeout: float) -> int:
-        sender = self._senders.get((to, lane))
+    def _sender(self, to: Union[str, Peer], lane: str, wait_if_away: bool, timeout: float) -> int:
+        sender = self._senders.get((to, lane, wait_if_away))
         if sender is None:
-            options = sized(_c.gimi_send_options, lane=messages.chosen("lane", messages.LANES, lane))
+            options = sized(_c.gimi_send_options, lane=messages.chosen("lane", messages.LANES, lane),
+                            wait_if_away=wait_if_away)
             made = (self._opened_at_once(_c.lib.gimi_sender, _peer(to), options) if isinstance(to, Peer) else
                     self._opened(_c.lib.gimi_sender_to_service, to_text(to), options, to_ms(timeout)))
-            sender = self._senders.setdefault((to, lane), made)
+            sender = self._senders.setdefault((to, lane, wait_if_away), made)
             if sender != made:  # another thread was faster
                 _c.lib.gimi_close(made)
         return sender

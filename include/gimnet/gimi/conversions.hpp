@@ -105,6 +105,7 @@ using SharedHandle = std::shared_ptr<const Handle>;
   how.age_ms_max = options.age_ms_max;
   how.timestamp = options.timestamp ? 1 : 0;
   how.end_at_loss = options.end_at_loss ? 1 : 0;
+  how.wait_if_away = options.wait_if_away ? 1 : 0;
   return how;
 }
 

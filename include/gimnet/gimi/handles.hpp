@@ -128,14 +128,15 @@ struct SendCounts {
 /// window and counts. The options of the first hold as long as the node lives; others are refused.
 /// One to a service follows it: while nobody has the service, send() answers not_found; when it is
 /// back, under whichever node and group, messages go there. Messages not acknowledged at its former
-/// place count as lost.
+/// place count as lost. While its program is away, send() answers not_found, too, or waits
+/// (SendOptions::wait_if_away): nothing comes to a program that has not accepted it yet.
 class Sender {
  public:
   /// Sends 0 bytes to 1 GiB. Ok: it is on its way; of a synchronized stream, settle() and counts()
   /// tell what became of it. Waits while the window is full (AtFullWindow::wait) or the hub has
   /// paused the destination. Errors: timeout (nothing was sent), window_full, not_found (a service
-  /// that nobody has), not_connected, refused, not_delivered (also of SendOptions::end_at_loss:
-  /// nothing was sent), too_large, closed.
+  /// that nobody has, or that is away), not_connected, refused, not_delivered (also of
+  /// SendOptions::end_at_loss: nothing was sent), too_large, closed.
   Outcome<void> send(BytesView data, Timeout timeout = kForever, More more = More::no) const {
     return detail::outcome_of(gimi_send(handle_->value(), data.data(), data.size(),
                                         milliseconds_of(timeout), more == More::yes ? 1 : 0));

@@ -133,6 +133,10 @@ struct SendOptions {
   /// not_delivered, for streams in which what comes later is worth nothing without what came
   /// before.
   bool end_at_loss = false;
+  /// To a service that is away, since its program lost its connection or has not accepted it again:
+  /// send() waits until it is there, within the time given. False: send() answers not_found at
+  /// once. Each Sender has its own.
+  bool wait_if_away = false;
   friend bool operator==(const SendOptions&, const SendOptions&) = default;
 };
 

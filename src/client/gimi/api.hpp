@@ -92,10 +92,11 @@ struct AcceptedObject final : Source {
 
 struct SenderObject final : Object {
   static constexpr HandleKind kKind = HandleKind::sender;
-  SenderObject(SharedCore the_core, StreamTable::Stream the_stream)
-      : core(std::move(the_core)), stream(std::move(the_stream)) {}
+  SenderObject(SharedCore the_core, StreamTable::Stream the_stream, AtAway while_away)
+      : core(std::move(the_core)), stream(std::move(the_stream)), at_away(while_away) {}
   const SharedCore core;  ///< outlives the stream
   const StreamTable::Stream stream;
+  const AtAway at_away;  ///< of this Sender alone: others share the stream
 };
 
 struct WatchObject final : Object {

@@ -24,8 +24,13 @@ gimi_status with_send_options(const gimi_send_options* options, const Body& body
     how.timestamp = given.timestamp != 0;
     how.age_ms_max = given.age_ms_max;
     how.end_at_loss = given.end_at_loss != 0;
+    how.wait_if_away = given.wait_if_away != 0;
     return body(how);
   });
+}
+
+AtAway at_away(const SendOptions& options) {
+  return options.wait_if_away ? AtAway::wait : AtAway::refuse;
 }
 
 }  // namespace
@@ -126,7 +131,7 @@ gimi_status gimi_sender_to_service(gimi_handle node, const char* full_name,
         stream = std::move(*made);
       }
       if (const auto failure = conflict(*stream, how)) return fail(*failure);
-      return give<SenderObject>(sender, found.core, std::move(stream));
+      return give<SenderObject>(sender, found.core, std::move(stream), at_away(how));
     });
   });
 }
@@ -139,7 +144,7 @@ gimi_status gimi_sender(gimi_handle node, gimi_peer to, const gimi_send_options*
     return with_send_options(options, [&](const SendOptions& how) {
       auto stream = found.core->streams().stream(Peer{to}, how);
       if (!stream) return fail(stream.failure());
-      return give<SenderObject>(sender, found.core, std::move(*stream));
+      return give<SenderObject>(sender, found.core, std::move(*stream), at_away(how));
     });
   });
 }
@@ -149,7 +154,7 @@ gimi_status gimi_send(gimi_handle sender, const void* data, size_t size, int32_t
   if (data == nullptr && size != 0) return is_null("gimi_send(): data");
   return with<SenderObject>(sender, [&](SenderObject& found) {
     return answer(found.stream->send(bytes_of(data, size), timeout_of(timeout_ms),
-                                     more != 0 ? More::yes : More::no));
+                                     more != 0 ? More::yes : More::no, found.at_away));
   });
 }
 
@@ -157,7 +162,8 @@ gimi_status gimi_send_confirmed(gimi_handle sender, const void* data, size_t siz
                                 int32_t timeout_ms) {
   if (data == nullptr && size != 0) return is_null("gimi_send_confirmed(): data");
   return with<SenderObject>(sender, [&](SenderObject& found) {
-    return answer(found.stream->send_confirmed(bytes_of(data, size), timeout_of(timeout_ms)));
+    return answer(
+        found.stream->send_confirmed(bytes_of(data, size), timeout_of(timeout_ms), found.at_away));
   });
 }
 

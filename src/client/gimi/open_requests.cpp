@@ -132,8 +132,9 @@ Outcome<std::uint32_t> OpenRequests::open(const std::string& service, BytesView 
 std::optional<OpenRequests::Sending> OpenRequests::prepare(std::uint32_t number, Open& open,
                                                            std::int64_t now_ns) {
   const auto service = services_.find(open.service);
-  if (service == services_.end() || service->second.place.destination() == 0) return std::nullopt;
+  if (service == services_.end()) return std::nullopt;
   const ServicePlace& place = service->second.place;
+  if (place.destination() == 0 || place.away) return std::nullopt;
   std::uint32_t left_ms = proto::gimi::kNoDeadline;
   if (open.deadline_ns != INT64_MAX) {
     const std::int64_t left = std::max<std::int64_t>(open.deadline_ns - now_ns, 0) / 1'000'000;
@@ -145,6 +146,7 @@ std::optional<OpenRequests::Sending> OpenRequests::prepare(std::uint32_t number,
   if (open.repeat) flags |= proto::gimi::kFlagRepeat;
   open.provider = place.provider;
   open.session = place.session;
+  open.instance = place.key.instance;
   open.again_ns = 0;
   Envelope envelope{place.group, NIF_SERVICE, NIF_POLICY_DEFAULT, open.lane,
                     place.key,   0,           NIF_FLAG_REPORT};
@@ -299,16 +301,28 @@ void OpenRequests::on_service_moved(const std::string& service, const ServicePla
     const bool is_there = place.destination() != 0;
     for (auto& [number, open] : open_) {
       if (open.service != service || open.reply) continue;
-      const bool same = place.provider == open.provider && place.session == open.session;
+      const bool same = place.provider == open.provider && place.session == open.session &&
+                        place.key.instance == open.instance;
       if (open.may_have_come() && !(is_there && same)) {
         ask_the_next(open, is_there);
-      } else if (is_there && open.again_ns != 0) {
+      } else if (is_there && !place.away && open.again_ns != 0) {
         open.again_ns = steady_now_ns();
       }
     }
     ended_.notify_all();  // wait_for_place()
   }
   attend_();
+}
+
+void OpenRequests::find_nobody(Open& open, std::int64_t now_ns) {
+  const auto service = services_.find(open.service);
+  if (service != services_.end() && service->second.place.away) {
+    open.again_ns = now_ns + kRetryNs;
+    return;
+  }
+  retry(open, open.may_have_come()
+                  ? gone(open.service)
+                  : without_reply(Status::not_found, Ran::no, open.service + ": nobody answers"));
 }
 
 void OpenRequests::ask_the_next(Open& open, bool is_there) {
@@ -359,9 +373,7 @@ bool OpenRequests::tick(std::int64_t now_ns) {
       if (auto sending = prepare(number, open, now_ns)) {
         due.emplace_back(number, std::move(*sending));
       } else {
-        retry(open, open.may_have_come() ? gone(open.service)
-                                         : without_reply(Status::not_found, Ran::no,
-                                                         open.service + ": nobody answers"));
+        find_nobody(open, now_ns);
       }
     }
   }

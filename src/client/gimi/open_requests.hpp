@@ -112,6 +112,7 @@ class OpenRequests {
     std::int64_t give_up_ns = 0;  ///< until then it is sent again; 0: it has found its way so far
     std::uint32_t provider = 0;   ///< to whom it was sent last; 0: nobody yet
     std::uint64_t session = 0;    ///< of the provider
+    std::uint32_t instance = 0;   ///< of the service: each program draws another one
     bool sent = false;            ///< the last time, and nobody said that it did not arrive
     bool unsure = false;          ///< it was sent before that, and nobody knows what became of it
     std::optional<Ended> reply;
@@ -132,6 +133,8 @@ class OpenRequests {
       GIMNET_EXCLUDES(mutex_);
   void finish(Open& open, Ended reply) GIMNET_REQUIRES(mutex_);
   void time_out(Open& open) GIMNET_REQUIRES(mutex_);
+  /// Nobody answers there now: it waits for its time if the service is away, else as retry().
+  void find_nobody(Open& open, std::int64_t now_ns) GIMNET_REQUIRES(mutex_);
   /// It found no way: sends it again soon, or ends it if that went on for too long.
   void retry(Open& open, Ended otherwise) GIMNET_REQUIRES(mutex_);
   /// The program that was asked has gone. One that may be done twice waits for the next one.

@@ -19,13 +19,14 @@ Loss withdrawn() { return {LossReason::service_gone, "the service was withdrawn"
 
 }  // namespace
 
-Outcome<void> SendStream::send(BytesView data, Timeout timeout, More more) {
-  return send(data, {.deadline_ns = deadline_after(timeout), .more = more});
+Outcome<void> SendStream::send(BytesView data, Timeout timeout, More more, AtAway at_away) {
+  return send(data, {.deadline_ns = deadline_after(timeout), .more = more, .at_away = at_away});
 }
 
-Outcome<void> SendStream::send_confirmed(BytesView data, Timeout timeout) {
+Outcome<void> SendStream::send_confirmed(BytesView data, Timeout timeout, AtAway at_away) {
   Confirmation confirmation;
-  const Order order{.deadline_ns = deadline_after(timeout), .confirmation = &confirmation};
+  const Order order{
+      .deadline_ns = deadline_after(timeout), .at_away = at_away, .confirmation = &confirmation};
   auto fate = send(data, order);
   const MutexLock lock(mutex_);
   if (fate) fate = await(confirmation, order.deadline_ns);
@@ -80,16 +81,27 @@ Outcome<void> SendStream::send(BytesView data, const Order& order) {
   return failure;
 }
 
+Failure SendStream::nobody_there() const {
+  std::string why = "nobody accepts it at the moment; it can be sent to again when it is back";
+  if (destination_.id != 0) {
+    why = service_ + " is away";
+    const std::int64_t away_s = (steady_now_ns() - away_since_ns_) / 1'000'000'000;
+    if (away_since_ns_ != 0) why += " since " + std::to_string(away_s) + " s";
+  }
+  return {Status::not_found, "not sent to " + service_ + ": " + why};
+}
+
 Outcome<SendStream::Turn> SendStream::take_turn(BytesView data, const Order& order) {
   // A message to be confirmed waits for room, whatever others of its stream do.
   const bool waits = order.confirmation != nullptr || options_.at_full == AtFullWindow::wait;
   while (!end_) {
     if (options_.end_at_loss && counts_.lost != 0) return loss();
-    if (destination_.id == 0) {
-      return Failure{
-          Status::not_found,
-          "not sent to " + service_ +
-              ": nobody accepts it at the moment; it can be sent to again when it is back"};
+    if (destination_.id == 0) return nobody_there();
+    if (place_.away) {
+      if (order.at_away == AtAway::refuse) return nobody_there();
+      if (is_over(order.deadline_ns)) return Failure{Status::timeout, nobody_there().sentence};
+      static_cast<void>(changed_.wait_until(mutex_, order.deadline_ns));
+      continue;
     }
     const bool asks = synchronized() || order.confirmation != nullptr;
     const bool room = !asks || window_.has_room(data.size());
@@ -288,7 +300,9 @@ void SendStream::on_moved(const ServicePlace& place) {
   const std::uint32_t id = place.destination();
   const bool same =
       id == destination_.id && place.provider == place_.provider && place.session == place_.session;
+  if (place.away != place_.away) away_since_ns_ = place.away ? steady_now_ns() : 0;
   place_ = place;
+  changed_.notify_all();
   if (same) return;
   lose_all(id == 0 ? withdrawn()
                    : Loss{LossReason::service_gone,
@@ -297,7 +311,6 @@ void SendStream::on_moved(const ServicePlace& place) {
   destination_.epoch = Uplink::draw_epoch();
   destination_.id = id;
   if (id != 0) destination_.key = place.key;
-  changed_.notify_all();
 }
 
 std::uint32_t SendStream::epoch() {
@@ -332,7 +345,7 @@ bool SendStream::tick(std::int64_t now_ns) {
     if (end_ || (window_.empty() && !held_)) return watched_ = false;
     if (sending_)
       return true;  // what that thread sends stands before a PING that could be put behind it now
-    if (held_ && window_.has_room(held_->size())) {
+    if (held_ && window_.has_room(held_->size()) && !place_.away) {
       data = std::exchange(held_, std::nullopt);
       sequence = window_.open(data->size(), now_ns);
     } else if (window_.ping_due(now_ns)) {

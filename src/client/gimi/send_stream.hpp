@@ -35,10 +35,14 @@ struct ServicePlace {
   MessageKey key;
   bool accepts = false;  ///< it takes data, and gives none
   bool latest = false;   ///< of Delivery::latest
+  bool away = false;  ///< it accepts, and its node has lost its connection and not accepted again
 
   /// The destination of messages; 0: nobody takes them.
   [[nodiscard]] std::uint32_t destination() const { return provider != 0 ? group : 0; }
 };
+
+/// The behaviour of send() while the service is away.
+enum class AtAway : std::uint8_t { refuse, wait };
 
 /// A stream of DATA with one key, to one node or to whoever accepts one service. Thread safety: any
 /// thread; nothing that is called from the library's thread waits for a thread that sends.
@@ -62,10 +66,11 @@ class SendStream {
         destination_{NIF_SERVICE, place.destination(), place.key, Uplink::draw_epoch()},
         window_(window_of(options)) {}
 
-  [[nodiscard]] Outcome<void> send(BytesView data, Timeout timeout, More more)
-      GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] Outcome<void> send(BytesView data, Timeout timeout, More more,
+                                   AtAway at_away = AtAway::refuse) GIMNET_EXCLUDES(mutex_);
   /// send(), and waits for what becomes of this one message; also of a stream without a window.
-  [[nodiscard]] Outcome<void> send_confirmed(BytesView data, Timeout timeout)
+  [[nodiscard]] Outcome<void> send_confirmed(BytesView data, Timeout timeout,
+                                             AtAway at_away = AtAway::refuse)
       GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] Outcome<void> settle(Timeout timeout) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] SendCounts counts() GIMNET_EXCLUDES(mutex_);
@@ -121,6 +126,7 @@ class SendStream {
   struct Order {
     std::int64_t deadline_ns = 0;
     More more = More::no;
+    AtAway at_away = AtAway::refuse;
     Confirmation* confirmation = nullptr;  ///< null: nobody waits for the fate of this message
   };
   /// A message between its sequence and NIF.
@@ -140,6 +146,8 @@ class SendStream {
   [[nodiscard]] Outcome<Turn> take_turn(BytesView data, const Order& order) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] Outcome<void> await(const Confirmation& confirmation, std::int64_t deadline_ns)
       GIMNET_REQUIRES(mutex_);
+  /// Why nothing is sent to a service that nobody has, or that is away.
+  [[nodiscard]] Failure nobody_there() const GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status transmit(const Destination& to, const proto::gimi::MessageHeader& header,
                                     BytesView data, More more, std::int32_t timeout_ms) const;
   [[nodiscard]] nif_status transmit_ping(const Destination& to, std::uint32_t number) const;
@@ -163,6 +171,8 @@ class SendStream {
   Mutex mutex_;
   Condition changed_;
   ServicePlace place_ GIMNET_GUARDED_BY(mutex_);  ///< of a stream to a service
+  /// When it was told that the service is away now; 0: it is not, or was before.
+  std::int64_t away_since_ns_ GIMNET_GUARDED_BY(mutex_) = 0;
   Destination destination_ GIMNET_GUARDED_BY(mutex_);
   AckWindow window_ GIMNET_GUARDED_BY(mutex_);
   SendCounts counts_ GIMNET_GUARDED_BY(mutex_);

@@ -167,7 +167,8 @@ nif_status ServiceTable::ask(const Subscribed& service, std::int32_t timeout_ms)
                            found.session,
                            {found.message_type, found.instance},
                            found.direction == NIF_ACCEPTS,
-                           found.delivery == NIF_LATEST_DELIVERY};
+                           found.delivery == NIF_LATEST_DELIVERY,
+                           uplink_.is_away(service->name())};
   const bool was_refused = service->is_refused();
   {
     const MutexLock lock(mutex_);
@@ -319,14 +320,6 @@ void ServiceTable::on_not_retained(std::uint32_t group,
   if (place != published_by_group_.end()) place->second->on_not_retained(sent);
 }
 
-std::optional<Failure> ServiceTable::refusal_of(const nif_incoming& moved) {
-  if (moved.group != 0 || moved.reason == NIF_OK) return std::nullopt;
-  const auto status = static_cast<nif_status>(moved.reason);
-  std::string words(static_cast<const char*>(moved.payload), moved.size);
-  if (words.empty()) words = nif_status_text(status);
-  return Failure{status_of(status), std::move(words)};
-}
-
 ServiceTable::Place ServiceTable::on_service_moved(const nif_incoming& moved) {
   const std::string full_name = moved.text;
   const ServicePlace place{moved.group,
@@ -334,7 +327,8 @@ ServiceTable::Place ServiceTable::on_service_moved(const nif_incoming& moved) {
                            moved.count,
                            {moved.message_type, moved.instance},
                            moved.direction == NIF_ACCEPTS,
-                           moved.delivery == NIF_LATEST_DELIVERY};
+                           moved.delivery == NIF_LATEST_DELIVERY,
+                           (moved.flags & NIF_SERVICE_AWAY) != 0};
   {
     const MutexLock lock(mutex_);
     if (open_ != 0) return Place::not_yet;

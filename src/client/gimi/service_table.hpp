@@ -90,7 +90,13 @@ class ServiceTable {
   void on_not_retained(std::uint32_t group, const std::optional<proto::gimi::MessageHeader>& sent)
       GIMNET_EXCLUDES(mutex_);
   /// The refusal that a NIF_SERVICE_MOVED or NIF_OWN_SERVICE_MOVED tells; nothing: none.
-  [[nodiscard]] static std::optional<Failure> refusal_of(const nif_incoming& moved);
+  [[nodiscard]] static std::optional<Failure> refusal_of(const nif_incoming& moved) {
+    if (moved.group != 0 || moved.reason == NIF_OK) return std::nullopt;
+    const auto status = static_cast<nif_status>(moved.reason);
+    std::string words(static_cast<const char*>(moved.payload), moved.size);
+    if (words.empty()) words = nif_status_text(status);
+    return Failure{status_of(status), std::move(words)};
+  }
   [[nodiscard]] Place on_service_moved(const nif_incoming& moved) GIMNET_EXCLUDES(mutex_);
   /// `unknown`: nor is one of an earlier service of that name, which had `former`.
   struct OwnMove {

@@ -32,6 +32,8 @@ std::optional<Failure> conflict(const SendStream& standing, const SendOptions& o
   SendOptions wanted = options;
   // The service says its key.
   if (!standing.service().empty()) wanted.key = standing.options().key;
+  // Each Sender has a wish of its own.
+  wanted.wait_if_away = standing.options().wait_if_away;
   if (wanted == standing.options()) return std::nullopt;
   const bool to_service = !standing.service().empty();
   return Failure{Status::bad_argument,

@@ -150,6 +150,11 @@ void Uplink::rouse() const {
   if (nif::Node* const direct = direct_.load()) direct->thread().rouse();
 }
 
+bool Uplink::is_away(const std::string& full_name) const {
+  nif::Node* const direct = direct_.load();
+  return direct != nullptr && direct->declarations().is_away(full_name);
+}
+
 bool Uplink::tell_missed(std::uint32_t group, std::uint64_t total) const {
   nif::Node* const direct = direct_.load();
   bool told = false;

@@ -86,6 +86,8 @@ class Uplink {
   /// As NodeThread::set_task() and NodeThread::rouse().
   void set_task(std::function<net::Deadline()> task) const;
   void rouse() const;
+  /// As Declarations::is_away().
+  [[nodiscard]] bool is_away(const std::string& full_name) const;
   /// As CreditBook::tell_missed().
   [[nodiscard]] bool tell_missed(std::uint32_t group, std::uint64_t total) const;
 

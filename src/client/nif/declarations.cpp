@@ -101,8 +101,8 @@ void Declarations::add_subscription(const proto::ns::Subscribe& subscription,
   const MutexLock lock(mutex_);
   beginning_.erase(subscription.name);
   subscriptions_.insert_or_assign(
-      subscription.name,
-      Subscription{subscription, state.group, state.group, state.provider, state.session});
+      subscription.name, Subscription{subscription, state.group, state.group, state.provider,
+                                      state.session, state.away});
 }
 
 std::optional<Declarations::Former> Declarations::begin_subscription(
@@ -159,8 +159,7 @@ bool Declarations::on_service_moved(const proto::ns::ServiceMoved& event) {
     return true;
   }
   const GroupId former = std::exchange(found->second.group, event.group);
-  found->second.provider = event.provider;
-  found->second.session = event.session;
+  found->second.take_provider(event);
   if (former != event.group && !is_subscribed(former)) credits_.forget(former);
   credits_.open(event.group, event.window, found->second.request.number);
   return !found->second.ended;
@@ -356,8 +355,7 @@ void Declarations::on_subscribed(const std::string& full_name, const proto::Payl
     const GroupId former = std::exchange(known.group, now.group);
     // A hub that began anew may give another program the same group.
     bool changed = former != now.group;
-    changed |= std::exchange(known.provider, now.provider) != now.provider;
-    changed |= std::exchange(known.session, now.session) != now.session;
+    changed |= known.take_provider(now);
     // Also that the hub takes it again: a program that was told of the refusal has to know.
     changed |= std::exchange(known.refused, !answer) == answer.has_value();
     // Requests of the program in between may never have left.

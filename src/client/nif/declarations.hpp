@@ -104,6 +104,12 @@ class Declarations {
   void go_on() GIMNET_EXCLUDES(mutex_);
   /// False: nothing that the program waits for.
   [[nodiscard]] bool on_service_moved(const proto::ns::ServiceMoved& event) GIMNET_EXCLUDES(mutex_);
+  /// Has the hub said last that the service is away? False also of one that is not subscribed.
+  [[nodiscard]] bool is_away(const std::string& full_name) GIMNET_EXCLUDES(mutex_) {
+    const MutexLock lock(mutex_);
+    const auto found = subscriptions_.find(full_name);
+    return found != subscriptions_.end() && found->second.away;
+  }
   /// The events of the last answer for the program. Takes the references along.
   [[nodiscard]] std::vector<Item> take_events();
   ~Declarations();
@@ -123,11 +129,20 @@ class Declarations {
     bool ended = false;  ///< for the program, and the hub may still have it
   };
   struct Subscription {
+    /// Returns whether the provider, its session, or whether it is away, is new.
+    bool take_provider(const proto::ns::ServiceState& now) {
+      const bool same = provider == now.provider && session == now.session && away == now.away;
+      provider = now.provider;
+      session = now.session;
+      away = now.away;
+      return !same;
+    }
     proto::ns::Subscribe request;
     GroupId group;
     GroupId former;  ///< when it was declared last
     NodeId provider;
     std::uint64_t session = 0;  ///< of the provider
+    bool away = false;          ///< it accepts, and has lost its connection
     bool ended = false;         ///< for the program, and the hub may still have it
     bool refused = false;       ///< by the hub, when it was declared last
   };

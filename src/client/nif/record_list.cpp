@@ -132,6 +132,7 @@ void put_service(nif_incoming& incoming, const proto::ns::ServiceState& state) {
   incoming.instance = state.instance;
   incoming.delivery = static_cast<std::uint32_t>(state.delivery);
   incoming.direction = static_cast<std::uint32_t>(state.direction);
+  incoming.flags = state.away ? NIF_SERVICE_AWAY : 0;
 }
 
 }  // namespace gimnet::nif

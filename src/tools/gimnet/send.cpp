@@ -22,7 +22,7 @@ namespace {
 constexpr std::size_t kWindow = 64;
 /// The largest message that any node can take.
 constexpr std::size_t kMessageBytesMax = std::size_t{1} << 30;
-/// The wait for acknowledgements of which nothing is said.
+/// The wait of which nothing is said: for acknowledgements, or for a service that is away.
 constexpr Timeout kSilentWait{2'000};
 
 /// So that a wrong name is known before anything else is done.
@@ -32,7 +32,13 @@ Outcome<void> check_readable(const std::string& path) {
 }
 
 Outcome<void> send_one(const Sender& sender, BytesView message, More more) {
-  auto sent = sender.send(message, kForever, more);
+  auto sent = sender.send(message, kSilentWait, more);
+  if (sent.is(Status::timeout)) {
+    const std::string& why = sent.failure().sentence;
+    if (why.find(" is away") != std::string::npos)
+      say(why.substr(why.find(": ") + 2) + "; waiting for it");
+    sent = sender.send(message, kForever, more);
+  }
   if (sent || sent.failure().status != Status::too_large || message.size() > kMessageBytesMax)
     return sent;
   return Failure{Status::too_large,
@@ -178,6 +184,7 @@ ExitCode run_send(ToolSession& session) {
   stream.lane = options.lane;
   stream.window = kWindow;
   stream.end_at_loss = true;
+  stream.wait_if_away = true;
   const auto sender = to_service ? session.node().sender(options.target, stream)
                                  : session.node().sender(*peer, stream);
   if (!sender) return session.fail(sender.failure());

@@ -179,5 +179,21 @@ TEST_F(ToldAgain, HowManySubscribersThereAre) {
   }
 }
 
+TEST_F(ToldAgain, SaysWhetherAServiceThatAcceptsIsAway) {
+  ns::ServiceState away = state(kKnown, test::kPeerId);
+  away.direction = ns::Direction::accepts;
+  away.away = true;
+  connected_.hub.send_control(proto::Kind::ns, proto::encode(ns::ServiceMoved{away, "peer/scan"}));
+  const nif_incoming gone = next();
+  EXPECT_EQ(gone.type, NIF_SERVICE_MOVED);
+  EXPECT_EQ(gone.flags, NIF_SERVICE_AWAY);
+  // It was there again while this node was away itself.
+  come_back();
+  answer_subscribe(kKnown);
+  const nif_incoming back = next();
+  EXPECT_EQ(back.type, NIF_SERVICE_MOVED);
+  EXPECT_EQ(back.flags, 0);
+}
+
 }  // namespace
 }  // namespace gimnet::nif

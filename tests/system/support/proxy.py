@@ -3,6 +3,7 @@
 import select
 import socket
 import threading
+import time
 
 
 class Proxy:
@@ -17,6 +18,7 @@ class Proxy:
         self._other = {}  # each socket's other end
         self._wake_in, self._wake_out = socket.socketpair()
         self._ended = False
+        self._refuses_until = 0.0
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
         test.addCleanup(self._end)
@@ -30,6 +32,11 @@ class Proxy:
             self.dropped += len(ends) // 2
         self._wake_out.send(b"x")
         return len(ends) // 2
+
+    def break_for(self, seconds):
+        """The same, and nobody gets through for so long."""
+        self._refuses_until = time.monotonic() + seconds
+        return self.drop_all()
 
     def _close(self, end):
         self._other.pop(end, None)
@@ -51,6 +58,8 @@ class Proxy:
             end.recv(4096)
         elif end is self._listener:
             near = end.accept()[0]
+            if time.monotonic() < self._refuses_until:
+                return near.close()
             try:
                 far = socket.create_connection(self._to)
             except OSError:  # nobody listens there at the moment
