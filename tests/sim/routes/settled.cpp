@@ -38,8 +38,8 @@ void Settled::check() {
   check_ids();
   find_shortest();
   for (std::size_t hub = 0; hub < world_.hubs_.size(); ++hub) {
-    check_words(hub);
     check_tables(hub);
+    check_words(hub);
     check_ways(hub);
     check_names(hub);
   }
