@@ -358,6 +358,7 @@ class Between(unittest.TestCase):
         self.assertEqual((hub["reachable"], hub["distance"], hub["cost"], hub["via"]), (False, None, None, None))
         status = json.loads(run_gimnet(second, "status", "--all", "--json").out)
         self.assertEqual((status["exact"], status["hubs"][0]), (False, {"id": 1, "name": "hub-1", "error": "unreachable"}))
+        pings.end()  # the hub has to be quiet at its end
         first.again(self)
         wait_until(lambda: b'"change":"reachable","hub_id":1' in watch.out, "that the hub can be reached again")
 
