@@ -71,9 +71,9 @@ typedef struct gimi_subscribe_options {
   double rate_hz; /**< Messages a second at most, the newest at each due time, 0.001..1,000; 0: no
                      bound. */
   /** Messages that may wait, 1..GIMI_QUEUE_MESSAGES_MAX. 0: 64, and with GIMI_OVERWRITE_OLDEST more
-   * as long as they take 16 MiB at most (docs/gimi.md, "Services"). With newest_only, with rate_hz
-   * and of a service with GIMI_LATEST 0 is 1 message, which a newer one overwrites, whatever
-   * at_full says. */
+   * as long as they take 16 MiB at most (docs/gimi.md, "Services"). But 0 is 1 message with
+   * newest_only, with rate_hz and of a service with GIMI_LATEST. A newer message overwrites that
+   * one, whatever at_full says. */
   size_t queue;
   gimi_at_full_queue at_full;
   int32_t timeout_ms;  /**< For the hub's answer; 0: 5,000. */

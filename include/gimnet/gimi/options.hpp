@@ -104,8 +104,8 @@ struct SubscribeOptions {
   bool newest_only = false;
   /// Messages that may wait, 1..kQueueMessagesMax. 0: kQueueMessagesDefault, and with
   /// AtFullQueue::overwrite_oldest more as long as they take 16 MiB at most (docs/gimi.md,
-  /// "Services"). With newest_only, with rate_hz and of a service with Delivery::latest 0 is 1
-  /// message, which a newer one overwrites, whatever `at_full` says.
+  /// "Services"). But 0 is 1 message with newest_only, with rate_hz and of a service with
+  /// Delivery::latest. A newer message overwrites that one, whatever `at_full` says.
   std::size_t queue = 0;
   AtFullQueue at_full = AtFullQueue::overwrite_oldest;
   Timeout timeout{5000};  ///< for the hub's answer

@@ -103,7 +103,7 @@ class MessageQueue {
   bool counted = false;
 
  private:
-  /// Of a message, beside its bytes: its place here, and what its storage takes.
+  /// Bytes of a message beside its own: its place here, and what its storage takes.
   static constexpr std::size_t kPlaceBytes = 160;
 
   [[nodiscard]] bool is_full() const;

@@ -43,7 +43,7 @@ class MissedNumbers {
   }
 
   [[nodiscard]] std::uint32_t highest() const { return highest_; }
-  /// Of all streams.
+  /// The messages missed of all streams.
   [[nodiscard]] std::uint64_t count() const { return count_; }
 
  private:

@@ -258,7 +258,7 @@ void Reception::on_too_large(const nif_incoming& in) {
   switch (view->header.operation) {
     case MessageOperation::data:
       if (in.kind == NIF_GROUP) return miss(in, view->header);
-      // Of UNICAST, NIF has told the sender by a TAKEN.
+      // NIF has told the sender of UNICAST by a TAKEN.
       if (in.kind == NIF_SERVICE && may_answer) tell_too_large(in, view->header, "is larger");
       return;
     case MessageOperation::request:

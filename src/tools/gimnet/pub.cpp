@@ -177,7 +177,7 @@ Outcome<void> wait_for_subscribers(const ToolSession& session, const Publisher& 
 /// second, for which nobody waits.
 void tell_missed(ToolSession& session) {
   const ToolOptions& options = session.options();
-  // Of `latest` those count too that a newer one replaced, as it should be.
+  // The hub counts those of `latest` too that a newer one replaced, as it should be.
   if (options.delivery == Delivery::latest) return;
   const auto services = session.node().services(options.target, kMissedAnswer);
   if (!services || services->empty() || services->front().missed == 0) return;
