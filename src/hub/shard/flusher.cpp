@@ -183,8 +183,8 @@ void Flusher::end_watch(Connection& connection) {
 
 /// Control frames go first, so the node hears of a gap before the data behind it.
 void Flusher::tell_losses(Connection& connection) {
-  if (push_flow(state_, connection, connection.outbox.untold_losses()))
-    connection.outbox.on_losses_told();
+  connection.outbox.tell_losses(
+      [&](const proto::flow::Dropped& losses) { return push_flow(state_, connection, losses); });
 }
 
 void Flusher::on_writable(Connection& connection) {

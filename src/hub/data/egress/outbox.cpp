@@ -369,7 +369,9 @@ void Outbox::lose_for_room(Entry& lost, std::size_t lane_index, proto::DropReaso
                            EgressContext& context) {
   if (lost.frames == 0) return;
   has_untold_losses_ = true;
-  lanes_->losses.add(lost, lanes_->queues[lane_index], reason);
+  UntoldLosses& losses =
+      reason == proto::DropReason::over_budget ? lanes_->of_short_memory : lanes_->of_full_lanes;
+  losses.add(lost, lanes_->queues[lane_index], reason);
   lose(lost, reason, context);
 }
 

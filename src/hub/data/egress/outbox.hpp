@@ -18,9 +18,9 @@
 
 namespace gimnet::hub {
 
-/// The frames that were dropped because a lane was full, since the connection's node was told last,
-/// and the node of which most bytes waited in that lane at the latest drop. Thread safety: one
-/// shard.
+/// The frames that were dropped to make room, for one reason, since the connection's node was told
+/// last, and the node of which most bytes waited in that lane at the latest drop. Thread safety:
+/// one shard.
 class UntoldLosses {
  public:
   /// `lost` does not wait in the lane, or no longer.
@@ -34,6 +34,7 @@ class UntoldLosses {
       source_ = lane.source_at(fullest);
     }
   }
+  [[nodiscard]] bool any() const { return frames_ != 0; }
   [[nodiscard]] proto::flow::Dropped message() const { return {reason_, source_, frames_}; }
 
  private:
@@ -162,13 +163,18 @@ class Outbox {
     if (counted_ != nullptr) counted_->on_run_lost(run, header);
   }
 
-  /// Frames were dropped because a lane was full, and the node was not told yet.
+  /// Frames were dropped to make room, and the node was not told yet.
   [[nodiscard]] bool has_untold_losses() const { return has_untold_losses_; }
-  /// The message that tells the node of them. REQUIRES: there are some.
-  [[nodiscard]] proto::flow::Dropped untold_losses() const { return lanes_->losses.message(); }
-  void on_losses_told() {
+  /// Calls tell(const proto::flow::Dropped&) for each reason, which returns whether the node is
+  /// told. REQUIRES: there are some.
+  template <class Tell>
+  void tell_losses(Tell&& tell) {
     has_untold_losses_ = false;
-    lanes_->losses = UntoldLosses{};
+    for (UntoldLosses* losses : {&lanes_->of_full_lanes, &lanes_->of_short_memory}) {
+      if (!losses->any()) continue;
+      if (tell(losses->message())) *losses = UntoldLosses{};
+      has_untold_losses_ |= losses->any();
+    }
   }
 
   /// Frames of an earlier connection, to be written again before all lanes.
@@ -240,7 +246,8 @@ class Outbox {
     RunQueue replay;
     std::uint64_t charged_bytes = 0;  ///< of the queues' entries, counted against the budget
     PauseBook pauses;
-    UntoldLosses losses;
+    UntoldLosses of_full_lanes;
+    UntoldLosses of_short_memory;
     OpenMessages open_messages;
   };
   /// A waiting piece below this is copied out of its slab, which it would keep from being used
