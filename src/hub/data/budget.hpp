@@ -63,15 +63,18 @@ class Budget {
 /// scarce. Thread safety: one shard.
 class BudgetLease {
  public:
-  /// Memory is scarce while less than this part of the budget is free. The shares of all
-  /// connections together are as much, so that they stay within the budget.
+  /// Memory is scarce while less than this part of the budget is free.
   static constexpr std::int64_t kScarcePart = 3;
+  /// While memory is scarce, connections that keep up may wait without a share until less than this
+  /// part of the budget is free. The shares of all connections together are as much, so that they
+  /// stay within the budget. The other half of the third is for bursts beside slow readers.
+  static constexpr std::int64_t kSharedPart = 6;
   /// The least share: room for some small messages, however many connections wait.
   static constexpr std::uint64_t kShareBytesMin = 4 * 1024;
   /// The largest share: what one read brings. A connection for which more waits does not keep up.
   static constexpr std::uint64_t kShareBytesMax = 256 * 1024;
   /// Shards tell each other this often how many of their connections wait. In that time a shard
-  /// reads some MiB at most, which is little beside a third of the budget.
+  /// reads some MiB at most, which is little beside a sixth of the budget.
   static constexpr std::uint64_t kTellMs = 10;
 
   explicit BudgetLease(Budget& budget) : budget_(budget) {}
@@ -111,12 +114,13 @@ class BudgetLease {
   /// Once a turn: finds out whether memory is scarce, and how large a connection's share is then.
   void begin_turn(std::uint64_t now_ms) {
     if (now_ms - told_ms_ >= kTellMs) tell(now_ms);
-    // Bytes that this shard has leased and does not use are free, too.
-    const std::int64_t free = budget_.left() + std::max<std::int64_t>(leased_ - used_, 0);
-    scarce_ = free < budget_.total() / kScarcePart;
+    scarce_ = free_bytes() < budget_.total() / kScarcePart;
     if (scarce_) update_share();
   }
   [[nodiscard]] bool scarce() const { return scarce_; }
+  /// Is so much free now that a connection which keeps up needs no share? Asked for each message
+  /// that has to wait while memory is scarce: the copies of one turn may come to a sixth.
+  [[nodiscard]] bool has_spare() const { return free_bytes() >= budget_.total() / kSharedPart; }
   /// Bytes that may wait for one connection. REQUIRES: scarce().
   [[nodiscard]] std::uint64_t share_bytes() const { return share_bytes_; }
   /// A connection of this shard begins to have data waiting.
@@ -126,6 +130,10 @@ class BudgetLease {
  private:
   static constexpr std::int64_t kKeptPieces = 2;
 
+  /// Bytes that this shard has leased and does not use are free, too.
+  [[nodiscard]] std::int64_t free_bytes() const {
+    return budget_.left() + std::max<std::int64_t>(leased_ - used_, 0);
+  }
   void tell(std::uint64_t now_ms) {
     told_ms_ = now_ms;
     if (waiting_ != told_) budget_.add_waiting(waiting_ - told_);
@@ -133,7 +141,7 @@ class BudgetLease {
   }
   void update_share() {
     const std::int64_t waiting = std::max<std::int64_t>(budget_.waiting() - told_ + waiting_, 1);
-    share_bytes_ = std::clamp(static_cast<std::uint64_t>(budget_.total() / kScarcePart / waiting),
+    share_bytes_ = std::clamp(static_cast<std::uint64_t>(budget_.total() / kSharedPart / waiting),
                               kShareBytesMin, kShareBytesMax);
   }
 

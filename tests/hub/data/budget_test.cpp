@@ -93,7 +93,21 @@ TEST(BudgetLease, WhatShardsKeepUnusedMakesNoMemoryScarce) {
   }
 }
 
-TEST(BudgetLease, AShareIsAThirdByTheConnectionsThatWaitWithinBounds) {
+TEST(BudgetLease, HasSpareWhileASixthIsFree) {
+  Budget budget(30 * kMiB);
+  BudgetLease lease(budget);
+  lease.take(25 * kMiB);
+  lease.begin_turn(1'000);
+  EXPECT_TRUE(lease.scarce());
+  EXPECT_TRUE(lease.has_spare()) << "exactly a sixth is free";
+  lease.take(1);
+  EXPECT_FALSE(lease.has_spare()) << "it is asked at once";
+  lease.give_back(1);
+  EXPECT_TRUE(lease.has_spare());
+  lease.give_back(25 * kMiB);
+}
+
+TEST(BudgetLease, AShareIsASixthByTheConnectionsThatWaitWithinBounds) {
   Budget budget(30 * kMiB);
   BudgetLease lease(budget);
   lease.take(21 * kMiB);
@@ -105,10 +119,10 @@ TEST(BudgetLease, AShareIsAThirdByTheConnectionsThatWaitWithinBounds) {
     return share;
   };
   EXPECT_EQ(share_of(0), 256u * 1024) << "nobody waits yet";
-  EXPECT_EQ(share_of(40), 256u * 1024) << "exactly";
-  EXPECT_EQ(share_of(41), 10 * kMiB / 41);
-  EXPECT_EQ(share_of(2'560), 4u * 1024) << "exactly";
-  EXPECT_EQ(share_of(2'561), 4u * 1024);
+  EXPECT_EQ(share_of(20), 256u * 1024) << "exactly";
+  EXPECT_EQ(share_of(21), 5 * kMiB / 21);
+  EXPECT_EQ(share_of(1'280), 4u * 1024) << "exactly";
+  EXPECT_EQ(share_of(1'281), 4u * 1024);
   lease.give_back(21 * kMiB);
 }
 
@@ -127,9 +141,9 @@ TEST(BudgetLease, ShardsAddTheirsEveryTenMilliseconds) {
     EXPECT_EQ(lease.share_bytes(), 256u * 1024) << "its own are known at once";
     other.begin_turn(1'010);
     lease.begin_turn(1'009);
-    EXPECT_EQ(lease.share_bytes(), 10 * kMiB / 100);
+    EXPECT_EQ(lease.share_bytes(), 5 * kMiB / 100);
     lease.begin_turn(1'010);
-    EXPECT_EQ(lease.share_bytes(), 10 * kMiB / 100) << "and count once";
+    EXPECT_EQ(lease.share_bytes(), 5 * kMiB / 100) << "and count once";
   }
   lease.begin_turn(1'011);
   EXPECT_EQ(lease.share_bytes(), 256u * 1024) << "those of a shard that ended count no more";

@@ -3,7 +3,8 @@
 
 #include "tests/hub/shard/support/hub_rig.hpp"
 
-// Tests a shard while less than a third of the hub's memory budget is free.
+// Tests a shard while less than a third of the hub's memory budget is free, mostly less than a
+// sixth.
 
 namespace gimnet::hub {
 namespace {
@@ -16,7 +17,7 @@ using ::testing::SizeIs;
 // A share is far less than a quarter of a resume buffer, after which a peer confirms by itself.
 TEST(ScarceMemory, AsksForTheConfirmThatAShareWaitsFor) {
   constexpr std::uint64_t kTaken = 250 << 20;
-  constexpr int kWaiting = 10'000;
+  constexpr int kWaiting = 5'000;
   HubRig rig;
   FakeNode& a = rig.join(0);
   FakeNode& b = rig.join(0, {.resume = true});
@@ -86,6 +87,41 @@ TEST(ScarceMemory, AConnectionWaitsAloneForItsShare) {
   rig.settle();
   EXPECT_EQ(rig.state(0).pool.pinned_bytes(), 0u);
   rig.state(0).budget.give_back(kTaken);
+}
+
+// 75 readers that take little once cost a healthy pair a fifth of its burst.
+TEST(ScarceMemory, ABurstToANodeThatReadsIsNotCut) {
+  constexpr std::uint64_t kTaken = 200 << 20;  // more than a sixth is free
+  constexpr int kSlow = 5'000;
+  constexpr int kBurst = 1'000;
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  FakeNode& b = rig.join(0);
+  BudgetLease& lease = rig.state(0).budget;
+  lease.take(kTaken);
+  for (int i = 0; i < kSlow; ++i) lease.begin_waiting();
+  const auto burst = [&] {
+    b.pipe.set_room(0);
+    for (int i = 0; i < kBurst; ++i) {
+      rig.send(a, b.id.value(), std::string(1'000, 'x'),
+               {.flags = static_cast<std::uint8_t>(proto::Policy::drop)});
+      if (i % 20 == 0) rig.turn();
+    }
+    rig.settle_without_reading();
+  };
+  burst();
+  b.pipe.set_room(MemoryPeer::kAll);
+  rig.settle();
+  EXPECT_THAT(b.frames, SizeIs(kBurst));
+  EXPECT_EQ(rig.dropped(DropReason::over_budget), 0u);
+  burst();
+  rig.pass_ms(Outbox::kBurstMs);
+  rig.send(a, b.id.value(), "one more", {.flags = static_cast<std::uint8_t>(proto::Policy::drop)});
+  rig.settle_without_reading();
+  EXPECT_EQ(rig.dropped(DropReason::over_budget), 1u) << "it does not keep up";
+  EXPECT_EQ(rig.dropped(DropReason::queue_full), 0u);
+  for (int i = 0; i < kSlow; ++i) lease.end_waiting();
+  lease.give_back(kTaken);
 }
 
 // Each has a budget of its own: whatever waits for the ones, the others have whole lanes.

@@ -24,10 +24,10 @@ bool still_worth_sending(const Entry& entry, HubId hub, std::int64_t now_ns) {
   return true;
 }
 
-/// While memory is scarce, half of the connection's share: the other half stays for what waits
-/// until room is confirmed.
-std::uint64_t resume_bytes_most(const BudgetLease& budget) {
-  return budget.scarce() ? budget.share_bytes() / 2 : UINT64_MAX;
+/// Half of the connection's share, if it has one: the other half stays for what waits until room is
+/// confirmed.
+std::uint64_t resume_bytes_most(const Outbox& outbox, EgressContext& context) {
+  return outbox.has_share(context) ? outbox.budget(context).share_bytes() / 2 : UINT64_MAX;
 }
 
 }  // namespace
@@ -194,7 +194,7 @@ void GatherWriter::owe(std::size_t lane, std::uint32_t bytes,
 std::uint32_t GatherWriter::allowed(const Run& run, std::size_t planned, Job& job) {
   if (job.resume == nullptr) return run.size;
   const CountedGroups* counted = job.outbox.counted_groups();
-  const std::uint64_t most = resume_bytes_most(job.outbox.budget(job.context));
+  const std::uint64_t most = resume_bytes_most(job.outbox, job.context);
   if (job.resume->make_room(planned, run.size, counted, most)) return run.size;
   std::uint32_t size = 0;
   for (std::uint32_t frame = 0; frame < run.frames; ++frame) {

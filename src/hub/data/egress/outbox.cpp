@@ -112,6 +112,7 @@ Run Outbox::copy_control(std::span<const std::byte> frame, EgressContext& contex
 }
 
 void Outbox::settle(EgressContext& context) {
+  if (!waits_here()) waiting_since_ms_ = context.now_ms;
   const bool begins = !std::exchange(backlog_, true);
   // Once it waits it does so until it is emptied.
   if (!waits_) note_waiting(context);
@@ -171,8 +172,7 @@ void Outbox::on_emptied(EgressContext& context) {
 
 void Outbox::signal_room(EgressContext& context) {
   if (!paused_anyone()) return;
-  const BudgetLease& own = budget(context);
-  if (own.scarce() && data_bytes() > own.share_bytes() / 2) return;
+  if (has_share(context) && data_bytes() > budget(context).share_bytes() / 2) return;
   for (std::size_t lane = 0; lane < proto::kLaneCount; ++lane) {
     if (!lanes_->pauses.pauses(lane)) continue;
     const auto places = lanes_->queues[lane].places_with_room(context.limits.lane_bytes(lane));
@@ -328,15 +328,15 @@ bool Outbox::ask_to_pause(const Entry& entry, const proto::FrameHeader& header,
   const std::size_t lane_index = header.lane & proto::kLaneMask;
   LaneQueue& lane = lanes_->queues[lane_index];
   const std::uint64_t lane_bytes = context.limits.lane_bytes(lane_index);
-  const bool scarce = backlog_ && budget(context).scarce();
-  if (!scarce && lane.is_within_share(NodeId{header.src}, entry.size, lane_bytes)) return true;
+  const bool by_share = backlog_ && has_share(context);
+  if (!by_share && lane.is_within_share(NodeId{header.src}, entry.size, lane_bytes)) return true;
   const auto beyond = [](std::uint64_t bytes, std::uint64_t limit) {
     return std::max(bytes, limit) - limit;
   };
   PauseBook::Excess excess{beyond(lane.block_bytes() + entry.size, lane_bytes / 2),
                            context.limits.reserve_bytes, held_bytes() + entry.size};
   if (!budget(context).scarce()) excess.held_most = budget_bytes(context.limits) / kPartFromAfar;
-  if (scarce) {
+  if (by_share) {
     const std::uint64_t share = budget(context).share_bytes();
     excess.bytes = std::max(excess.bytes, beyond(excess.held, share));
     excess.reserve = std::min(excess.reserve, share);

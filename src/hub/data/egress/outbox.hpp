@@ -132,6 +132,7 @@ class Outbox {
   void set_resume(ResumeBuffer* resume) { resume_ = resume; }
   /// So many bytes more, or fewer, are held by the pacer for this connection.
   void add_paced(std::uint64_t bytes, EgressContext& context) {
+    if (!waits_here()) waiting_since_ms_ = context.now_ms;
     paced_bytes_ += bytes;
     if (paced_bytes_ == bytes) note_waiting(context);
   }
@@ -142,10 +143,19 @@ class Outbox {
   /// All that waits for this connection: here with the memory of the entries, in the pacer, and
   /// until it is confirmed.
   [[nodiscard]] std::uint64_t held_bytes() const;
-  /// Memory is scarce, and with so many bytes more this connection would have more than its share.
-  [[nodiscard]] bool over_share(std::uint64_t bytes, EgressContext& context) const {
+  /// A connection that had nothing waiting within so long keeps up: it may have a burst.
+  static constexpr std::uint64_t kBurstMs = 1'000;
+  /// Does a share bound what waits for this connection? While memory is scarce, unless it keeps up
+  /// and there is memory to spare.
+  [[nodiscard]] bool has_share(EgressContext& context) const {
     const BudgetLease& own = budget(context);
-    return own.scarce() && held_bytes() + bytes > own.share_bytes();
+    if (!own.scarce()) return false;
+    const bool keeps_up = !waits_here() || context.now_ms - waiting_since_ms_ < kBurstMs;
+    return !keeps_up || !own.has_spare();
+  }
+  /// With so many bytes more this connection would have more than its share.
+  [[nodiscard]] bool over_share(std::uint64_t bytes, EgressContext& context) const {
+    return has_share(context) && held_bytes() + bytes > budget(context).share_bytes();
   }
   /// Lets frames go that were written and not confirmed, oldest first, as far as it takes to have
   /// room for so many bytes in the share.
@@ -286,6 +296,8 @@ class Outbox {
       lane.lose_all(which, [&](Entry& entry) { lose(entry, reason, context); });
     signal_room(context);
   }
+  /// Something waits that the connection could have taken: here, or in the pacer.
+  [[nodiscard]] bool waits_here() const { return backlog_ || paced_bytes_ != 0; }
   void note_waiting(EgressContext& context);
   /// While memory is scarce frames are taken in pieces that fit in a chunk: a longer one would stay
   /// for the sake of its last frame.
@@ -338,7 +350,8 @@ class Outbox {
   bool waits_ = false;  ///< counted among the connections that have data waiting
   bool has_untold_losses_ = false;
   bool link_ = false;
-  std::uint32_t link_lane_bytes_ = 0;  ///< 0: no link, or not measured: as for a node
+  std::uint32_t link_lane_bytes_ = 0;   ///< 0: no link, or not measured: as for a node
+  std::uint64_t waiting_since_ms_ = 0;  ///< while waits_here()
 };
 
 }  // namespace gimnet::hub

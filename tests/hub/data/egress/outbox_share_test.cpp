@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "hub/data/egress/outbox.hpp"
-#include "tests/hub/data/support/egress_rig.hpp"
+#include "tests/hub/data/support/outbox_share.hpp"
 
 // While memory is scarce each connection has a share of it. The senders of a full lane share that.
 
@@ -13,76 +13,15 @@ using proto::DropReason;
 using testing::EgressRig;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
+using testing::kBlock;
+using testing::kDrop;
+using testing::kKiB;
+using testing::kOldest;
+using testing::OutboxShare;
+using testing::sized;
 using ::testing::SizeIs;
 using testing::TestConnection;
-using testing::TestFrame;
 using Frames = hub::Run;  // Test has a Run() of its own
-
-constexpr std::uint8_t kBlock = 1;
-constexpr std::uint8_t kDrop = 2;
-constexpr std::uint32_t kKiB = 1024;
-
-/// Group frames are dropped from the oldest on.
-constexpr TestFrame kOldest{.kind = proto::Kind::group};
-
-Limits limits_of_the_test() {
-  Limits limits;
-  limits.budget_bytes = 12 << 20;
-  return limits;
-}
-
-/// A payload that makes a frame of exactly `size` bytes.
-std::string sized(std::uint64_t size, char fill = 'x') {
-  return std::string(size - proto::kHeaderSize, fill);
-}
-
-class OutboxShare : public ::testing::Test {
- protected:
-  OutboxShare() {
-    // 4 MiB by 128 connections; the one of the test is another one.
-    for (int i = 0; i < 127; ++i) rig.lease.begin_waiting();
-  }
-  ~OutboxShare() override {
-    if (rig.lease.scarce()) rig.lease.give_back(kTaken);
-    for (int i = 0; i < 127; ++i) rig.lease.end_waiting();
-  }
-  void TearDown() override { EXPECT_TRUE(rig.ledger_exact()); }
-
-  /// The connection takes nothing, and something waits for it. Memory becomes scarce.
-  void block(std::uint8_t lane = 3) {
-    connection.peer.set_room(0);
-    rig.push(connection.outbox, "first", {.kind = proto::Kind::group, .lane = lane});
-    EXPECT_EQ(connection.flush(), Flush::blocked);
-    make_scarce();
-  }
-  void make_scarce() {
-    rig.lease.take(kTaken);
-    rig.lease.begin_turn(0);
-    ASSERT_TRUE(rig.lease.scarce());
-    share = rig.lease.share_bytes();
-  }
-  void end_scarce() {
-    rig.lease.give_back(kTaken);
-    rig.lease.begin_turn(0);
-    ASSERT_FALSE(rig.lease.scarce());
-  }
-  /// The bytes for which the share has room yet.
-  std::uint64_t room() { return share - connection.outbox.held_bytes(); }
-  std::vector<std::string> starts() {
-    connection.peer.set_room(MemoryPeer::kAll);
-    std::vector<std::string> texts;
-    while (connection.flush() != Flush::emptied) {
-    }
-    for (const std::string& each : connection.take()) texts.push_back(each.substr(0, 1));
-    return texts;
-  }
-
-  static constexpr std::uint64_t kTaken = 10 << 20;
-  std::uint64_t looks_ = 0;
-  std::uint64_t share = 0;  ///< 32 KiB
-  EgressRig rig{limits_of_the_test()};
-  TestConnection connection{rig};
-};
 
 TEST_F(OutboxShare, DropsTheOldestBeyondTheShare) {
   block(1);
@@ -114,6 +53,33 @@ TEST_F(OutboxShare, IsOnlyAskedWhereSomethingWaits) {
   for (int i = 0; i < 8; ++i) rig.push(connection.outbox, sized(share), kOldest);
   EXPECT_FALSE(rig.tally.any_dropped) << "it may all be written at the end of the turn";
   EXPECT_THAT(starts(), SizeIs(8));
+}
+
+TEST_F(OutboxShare, BothReasonsAreTold) {
+  block();
+  rig.push(connection.outbox, sized(room(), 'a'), kOldest);
+  rig.push(connection.outbox, sized(proto::kHeaderSize), kOldest);
+  end_scarce();
+  for (int i = 0; i < 60; ++i) rig.push(connection.outbox, sized(share), kOldest);
+  const std::uint64_t full = rig.dropped(DropReason::queue_full);
+  EXPECT_GT(full, 0u);
+  std::vector<proto::flow::Dropped> told;
+  const auto tell = [&](const proto::flow::Dropped& losses) {
+    told.push_back(losses);
+    return losses.reason == DropReason::queue_full;
+  };
+  connection.outbox.tell_losses(tell);
+  ASSERT_THAT(told, SizeIs(2));
+  EXPECT_EQ(told[0].count, full);
+  EXPECT_EQ(told[1].reason, DropReason::over_budget);
+  EXPECT_EQ(told[1].count, rig.dropped(DropReason::over_budget));
+  EXPECT_TRUE(connection.outbox.has_untold_losses()) << "what could not be said waits";
+  connection.outbox.tell_losses([&](const proto::flow::Dropped& losses) {
+    told.push_back(losses);
+    return true;
+  });
+  EXPECT_THAT(told, SizeIs(3));
+  EXPECT_FALSE(connection.outbox.has_untold_losses());
 }
 
 TEST_F(OutboxShare, TakesFromTheLeastUrgentLaneFirst) {
@@ -270,7 +236,7 @@ TEST_F(OutboxShare, ALongRunIsTakenInPieces) {
 TEST_F(OutboxShare, WaitingConnectionsAreCounted) {
   const auto waiting = [&] {
     rig.lease.begin_turn(1'000'000 + ++looks_ * 10);
-    return rig.budget.waiting() - 127;
+    return rig.budget.waiting() - kOthers;
   };
   EXPECT_EQ(waiting(), 0);
   connection.peer.set_room(0);
