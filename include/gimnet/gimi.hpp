@@ -181,10 +181,10 @@ class Node : public HubAccess {
   /// messages that a service left out for this node.
   [[nodiscard]] LostCounts lost() const {
     const gimi_lost_counts counts = detail::lost_counts(handle_);
-    return {counts.incomplete,        counts.too_large,
-            counts.frames_broken_off, counts.unknown_service,
-            counts.unreadable,        counts.outdated,
-            counts.queue_full,        Peer{counts.queue_filled_by}};
+    return {
+        counts.incomplete, counts.too_large, counts.frames_broken_off, counts.unknown_service,
+        counts.unreadable, counts.outdated,  counts.queue_full,        Peer{counts.queue_filled_by},
+        counts.over_budget};
   }
 
   // ---- services

@@ -223,6 +223,7 @@ typedef struct gimi_lost_counts {
   uint64_t queue_full;        /**< Frames dropped because this node's queue at the hub was full. */
   gimi_peer queue_filled_by;  /**< The node that had sent most of the bytes in it; 0: not known. */
   uint32_t reserved;
+  uint64_t over_budget; /**< Frames dropped because the hub's memory for what waits was short. */
 } gimi_lost_counts;
 
 /** The fate of the messages of one stream. */

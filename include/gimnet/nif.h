@@ -372,8 +372,9 @@ typedef enum nif_incoming_type {
    * the hub or, from the own id, of this node. `no_such_group`, from the own id: so many frames to
    * own services had waited over a break, and the hub did not take their services again.
    * `queue_full` and `over_budget`: the hub dropped so many frames for this node, since its queue
-   * there was full [from: the node that had sent most of the bytes in it, whoever lost frames; 0:
-   * not known]. They come before the messages behind the gap. */
+   * there was full, or the hub's memory was short [from: the node that had sent most of the bytes
+   * in the queue, whoever lost frames; 0: not known]. They come before the messages behind the
+   * gap. */
   NIF_GAP = 2,
   /** Connected again after a break [from: own node id; flags: NIF_CONNECTED_*]. The library
    * declares services and subscriptions again by itself. Not delivered for the first connection,

@@ -67,7 +67,11 @@ struct LostCounts {
   /// The node that had sent most of the bytes in it, whichever lost frames. Id 0: nobody, or not
   /// known.
   Peer queue_filled_by = {};
-  /// Number of known losses: messages, and frames where only those are. Without queue_full.
+  /// Frames that the hub dropped because its memory for what waits was short: used up, or this
+  /// node's share of it.
+  std::uint64_t over_budget = 0;
+  /// Number of known losses: messages, and frames where only those are. Without queue_full and
+  /// over_budget.
   [[nodiscard]] std::uint64_t all() const {
     return incomplete + too_large + frames_broken_off + unknown_service + unreadable + outdated;
   }

@@ -257,8 +257,8 @@ nif_verdict Core::on_own_service_moved(const nif_incoming& in) {
 
 void Core::on_gap(const nif_incoming& in) {
   const auto reason = static_cast<proto::DropReason>(in.reason);
-  if (reason == proto::DropReason::queue_full || reason == proto::DropReason::over_budget)
-    return losses_.add_queue_full(in.from, in.count);
+  if (reason == proto::DropReason::queue_full) return losses_.add_queue_full(in.from, in.count);
+  if (reason == proto::DropReason::over_budget) return losses_.add_over_budget(in.count);
   if (reason == proto::DropReason::too_large) {
     losses_.add(reason, 1);
     return reception_.on_too_large(in);

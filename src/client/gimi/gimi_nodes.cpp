@@ -151,7 +151,8 @@ gimi_status gimi_lost(gimi_handle node, gimi_lost_counts* counts) {
                                  lost.outdated,
                                  lost.queue_full,
                                  lost.queue_filled_by.id,
-                                 0};
+                                 0,
+                                 lost.over_budget};
     nif::write_struct(whole, *counts);
     return GIMI_OK;
   });

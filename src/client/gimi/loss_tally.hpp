@@ -69,6 +69,8 @@ class LossTally {
     add(queue_full_, frames);
     queue_filled_by_.store(source, std::memory_order_relaxed);  // as add()
   }
+  /// The hub dropped `frames` since its memory for what waits was short.
+  void add_over_budget(std::uint64_t frames) { add(over_budget_, frames); }
   /// A message of a group that no subscription of this node has.
   void add_unknown_service() { add(unknown_service_, 1); }
   /// A KEYED message without a GIMI header.
@@ -85,7 +87,8 @@ class LossTally {
             unreadable_.load(std::memory_order_relaxed),  // see add()
             outdated_.load(std::memory_order_relaxed),
             queue_full_.load(std::memory_order_relaxed),  // see add()
-            Peer{queue_filled_by_.load(std::memory_order_relaxed)}};
+            Peer{queue_filled_by_.load(std::memory_order_relaxed)},
+            over_budget_.load(std::memory_order_relaxed)};
   }
 
  private:
@@ -108,6 +111,7 @@ class LossTally {
   Count outdated_{0};
   Count queue_full_{0};
   std::atomic<std::uint32_t> queue_filled_by_{0};
+  Count over_budget_{0};
 };
 
 }  // namespace gimnet::gimi

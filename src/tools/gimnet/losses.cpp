@@ -37,7 +37,8 @@ std::string queue_full_words(std::string_view whose, const Peer& filled_by) {
 }
 
 std::vector<std::string> LostMessages::news(std::int64_t now_ns) {
-  const bool known = all() == told_.all() && counts_.queue_full == told_.queue_full;
+  const bool known = all() == told_.all() && counts_.queue_full == told_.queue_full &&
+                     counts_.over_budget == told_.over_budget;
   if (known || !pace_.due(now_ns)) return {};
   return rest();
 }
@@ -59,6 +60,8 @@ std::vector<std::string> LostMessages::rest() {
                {"message", "its sender had been started again, and had sent newer ones"});
   add_sentence(sentences, counts_.queue_full, told_.queue_full,
                {"frame", queue_full_words("this node", counts_.queue_filled_by)});
+  add_sentence(sentences, counts_.over_budget, told_.over_budget,
+               {"frame", std::string(kMemoryShort)});
   told_ = counts_;
   return sentences;
 }
@@ -118,15 +121,22 @@ std::uint64_t MissedMessages::skipped(std::string_view service) const {
   return found == services_.end() ? 0 : found->second.skipped.missed;
 }
 
-/// The hub tells of a full queue before it sends what waits in it, and what comes behind the gaps.
-/// It may tell once of several gaps, or of several before the first of them is seen here.
+/// The hub tells of its drops before it sends what waits, and what comes behind the gaps. It may
+/// tell once of several gaps, or of several before the first of them is seen here.
 MissedMessages::Count& MissedMessages::cause_of(Service& service, std::uint64_t missed,
                                                 const Message& message) {
-  if (message.arrival_ns() - service.gap_ns > kOneFloodNs) service.unexplained = 0;
-  service.unexplained += queue_full_ - std::exchange(service.queue_full, queue_full_);
-  if (service.unexplained == 0) return service.unknown;
-  service.unexplained -= std::min(service.unexplained, missed);
+  if (message.arrival_ns() - service.gap_ns > kOneFloodNs)
+    service.queue_full.unexplained = service.over_budget.unexplained = 0;
+  service.queue_full.look(queue_full_);
+  service.over_budget.look(over_budget_);
+  const bool full = service.queue_full.unexplained != 0;
+  if (!full && service.over_budget.unexplained == 0) return service.unknown;
   service.gap_ns = message.arrival_ns();
+  if (!full) {
+    service.over_budget.explain(missed);
+    return service.squeezed;
+  }
+  service.queue_full.explain(missed);
   if (queue_filled_by_.id == 0 || queue_filled_by_.id == message.from().id) return service.slow;
   flooder_ = queue_filled_by_;
   return service.flooded;
@@ -134,6 +144,7 @@ MissedMessages::Count& MissedMessages::cause_of(Service& service, std::uint64_t 
 
 void MissedMessages::take_lost(const LostCounts& counts) {
   queue_full_ = counts.queue_full;
+  over_budget_ = counts.over_budget;
   queue_filled_by_ = counts.queue_filled_by;
   const std::uint64_t lost =
       counts.incomplete + counts.too_large + counts.unknown_service + counts.outdated;
@@ -158,6 +169,7 @@ std::vector<std::string> MissedMessages::rest() {
     add_sentence(sentences, service.slow, name, " did not come: this reader was too slow");
     add_sentence(sentences, service.flooded, name,
                  " did not come: " + queue_full_words("this reader", flooder_));
+    add_sentence(sentences, service.squeezed, name, " did not come: " + std::string(kMemoryShort));
     // Nobody tells a reader whether it or the sender was in the way.
     add_sentence(sentences, service.unknown, name,
                  " did not come: this reader was too slow, or the sender's connection or a "

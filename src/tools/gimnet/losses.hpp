@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -34,6 +35,10 @@ class NewsPace {
 /// no_such_node means that it has left, not that an id is wrong. REQUIRES: that name was found
 /// before.
 [[nodiscard]] std::string loss_words(const SendCounts& counts, const std::string& target);
+
+/// Why messages did not come: the hub's memory, whoever filled it.
+inline constexpr std::string_view kMemoryShort =
+    "the hub's memory for what waits was short (`gimnet ctl connections` shows for whom it waits)";
 
 /// Why messages did not come: a full queue, and who filled it, if that is known.
 [[nodiscard]] std::string queue_full_words(std::string_view whose, const Peer& filled_by);
@@ -86,20 +91,28 @@ class MissedMessages {
     std::uint64_t missed = 0;
     std::uint64_t told = 0;
   };
+  /// Frames of all services that the hub dropped for one reason, as one service looks at them.
+  struct DropNews {
+    std::uint64_t known = 0;        ///< as take_lost() had told at its last gap
+    std::uint64_t unexplained = 0;  ///< of these frames, those that no gap has explained yet
+    void look(std::uint64_t told) { unexplained += told - std::exchange(known, told); }
+    void explain(std::uint64_t missed) { unexplained -= std::min(unexplained, missed); }
+  };
   struct Service {
     std::uint32_t provider = 0;
     std::uint32_t sequence = 0;
     std::uint32_t reconnects = 0;
-    std::uint64_t queue_full = 0;   ///< as take_lost() had told at its last gap
-    std::uint64_t unexplained = 0;  ///< of these frames, those that no gap has explained yet
-    std::int64_t gap_ns = 0;        ///< when the last message came that was behind such a gap
+    DropNews queue_full;
+    DropNews over_budget;
+    std::int64_t gap_ns = 0;  ///< when the last message came that was behind a gap told of
     std::uint64_t missed = 0;
-    Count early;    ///< before it was subscribed to
-    Count broken;   ///< while the connection to the hub was
-    Count skipped;  ///< of Delivery::latest: for newer ones
-    Count slow;     ///< the queue at the hub was full, mostly of what its provider sent
-    Count flooded;  ///< the same, of what another node sent
-    Count unknown;  ///< by all that happens elsewhere
+    Count early;     ///< before it was subscribed to
+    Count broken;    ///< while the connection to the hub was
+    Count skipped;   ///< of Delivery::latest: for newer ones
+    Count slow;      ///< the queue at the hub was full, mostly of what its provider sent
+    Count flooded;   ///< the same, of what another node sent
+    Count squeezed;  ///< the hub's memory for what waits was short
+    Count unknown;   ///< by all that happens elsewhere
   };
   /// The longest time between two gaps of one full queue: behind it, frames without a gap were
   /// other messages.
@@ -116,6 +129,7 @@ class MissedMessages {
   std::uint64_t lost_ = 0;          ///< as take_lost() was told last
   std::uint64_t told_as_lost_ = 0;  ///< of those that did not come yet in numbers
   std::uint64_t queue_full_ = 0;    ///< as take_lost() was told last
+  std::uint64_t over_budget_ = 0;   ///< the same
   Peer queue_filled_by_;
   Peer flooder_;  ///< the last one that made somebody miss something
   bool untold_ = false;

@@ -23,9 +23,10 @@ void print(ToolSession& session, const Message& message, const Absent& absent) {
   }
 }
 
-/// Tells losses. Those that a full queue cost a service are told with its missed messages.
+/// Tells losses. Those that a full queue or short memory at the hub cost a service are told with
+/// its missed messages.
 void take_lost(LostMessages& lost, LostCounts counts, const MissedMessages* missed) {
-  if (missed != nullptr) counts.queue_full = 0;
+  if (missed != nullptr) counts.queue_full = counts.over_budget = 0;
   lost.take(counts);
 }
 

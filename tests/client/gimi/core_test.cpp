@@ -229,8 +229,9 @@ TEST_F(Lost, FramesThatTheHubDroppedAreCountedWithWhoFilledTheQueue) {
   const std::string text = "x";
   answer({1, MessageOperation::data, 0, 0}, std::as_bytes(std::span(text)));
   ASSERT_TRUE(node_->receive());
-  EXPECT_EQ(node_->lost().queue_full, 7u);
-  EXPECT_EQ(node_->lost().queue_filled_by, Peer{10});
+  EXPECT_EQ(node_->lost().queue_full, 5u);
+  EXPECT_EQ(node_->lost().queue_filled_by, Peer{9});
+  EXPECT_EQ(node_->lost().over_budget, 2u) << "nobody filled this node's queue";
   EXPECT_EQ(node_->lost().all(), 0u) << "those of a subscription are counted there";
 }
 

@@ -32,8 +32,10 @@ TEST(LossTally, KnowsWhoFilledTheQueueLast) {
   EXPECT_EQ(tally.counts().queue_filled_by, Peer{});
   tally.add_queue_full(9, 3);
   tally.add_queue_full(10, 4);
+  tally.add_over_budget(3);
   EXPECT_EQ(tally.counts().queue_full, 7u);
   EXPECT_EQ(tally.counts().queue_filled_by, Peer{10});
+  EXPECT_EQ(tally.counts().over_budget, 3u);
   EXPECT_EQ(tally.counts().all(), 0u);
 }
 

@@ -19,6 +19,9 @@ const char* const kBroken = " of r/s did not come: the connection to the hub was
 
 const char* const kFlooded =
     " of r/s did not come: the queue of this reader at the hub was full, mostly of what 7.9 sent";
+const char* const kSqueezed =
+    " of r/s did not come: the hub's memory for what waits was short (`gimnet ctl connections` "
+    "shows for whom it waits)";
 constexpr Peer kFlooder{7u << 20 | 9};
 
 class MissedMessagesTest : public testing::Test {
@@ -92,6 +95,18 @@ TEST_F(MissedMessagesTest, EachGapOfOneFloodHasItsCause) {
   take(11);
   EXPECT_EQ(missed_.rest(), Sentences{std::string("1 message") + kUnknown})
       << "all that was told of is found";
+}
+
+TEST_F(MissedMessagesTest, WhereTheHubsMemoryWasShortNobodyIsCalledSlow) {
+  take(1);
+  missed_.take_lost({.over_budget = 2});
+  EXPECT_EQ(take(4), 2u);
+  EXPECT_EQ(missed_.rest(), Sentences{std::string("2 messages") + kSqueezed});
+  missed_.take_lost({.queue_full = 1, .queue_filled_by = kFlooder, .over_budget = 5});
+  take(6);
+  EXPECT_EQ(missed_.rest(), Sentences{std::string("1 message") + kFlooded});
+  take(9);
+  EXPECT_EQ(missed_.rest(), Sentences{std::string("4 messages") + kSqueezed});
 }
 
 TEST_F(MissedMessagesTest, AGapLongAfterAFloodHasAnotherCause) {

@@ -103,6 +103,16 @@ TEST(LostMessages, AFullQueueIsSaidWithWhoFilledIt) {
   EXPECT_EQ(lost.rest(), Sentences{});
 }
 
+TEST(LostMessages, ShortMemoryIsNoFullQueue) {
+  LostMessages lost;
+  lost.take({.over_budget = 3});
+  EXPECT_EQ(lost.all(), 0u);
+  EXPECT_EQ(lost.news(100),
+            Sentences{"3 frames were lost: the hub's memory for what waits was short (`gimnet ctl "
+                      "connections` shows for whom it waits)"});
+  EXPECT_EQ(lost.rest(), Sentences{});
+}
+
 TEST(LostMessages, NewsComeAtMostOnceASecond) {
   LostMessages lost;
   lost.take({.incomplete = 1, .too_large = 0, .frames_broken_off = 0, .unknown_service = 0});
