@@ -13,7 +13,7 @@ from stranger_parts.client import BROADCAST, CTRL, GROUP, LIST, NS, UNICAST
 from support.processes import run_gimnet
 from support.waiting import wait_until
 
-SERVICE_MOVED, SUBSCRIBERS = 32, 33
+UNSUBSCRIBE, SERVICE_MOVED, SUBSCRIBERS = 11, 32, 33
 EVERYBODY = 0xFFFFFFFF
 
 
@@ -72,15 +72,36 @@ class Groups(Chain):
         self.assertEqual(viewers[0].taken, 5)
         self.exact()
 
-    def test_the_provider_counts_a_link_as_one_subscriber(self):
-        self.robot.advertise("scan")
-        for name in "ab":
-            self.viewer(self.last, name)
-        self.assertEqual(self.robot.event(SUBSCRIBERS)[4], 1)
-        self.stranger(self.first, "c").subscribe("robot/scan")
-        self.assertEqual(self.robot.event(SUBSCRIBERS)[4], 2)
-        shown = [json.loads(run_gimnet(hub, "services", "--json").out)[0]["subscribers"] for hub in (self.first, self.last)]
-        self.assertEqual(shown, [2, 2], "c and a link at the provider's hub, a and b at the last one")
+    def services(self, hub):
+        shown = run_gimnet(hub, "services", "--json")
+        self.assertEqual((shown.code, shown.err), (0, ""))
+        return json.loads(shown.out)
+
+    def test_the_provider_counts_the_subscribers_at_all_hubs(self):
+        group = self.robot.advertise("scan")[3]
+        viewers = [self.viewer(self.last, name) for name in "ab"]
+        self.viewer(self.middle, "c")
+        self.stranger(self.first, "d").subscribe("robot/scan")
+        self.until_subscribed(group, 4)
+        self.assertEqual([self.services(hub)[0]["subscribers"] for hub in (self.first, self.last)], [4, 4])
+        viewers[0].ask(NS, UNSUBSCRIBE, put(3, TEXT, "robot/scan"))
+        self.until_subscribed(group, 3)
+        viewers[1].ask(NS, UNSUBSCRIBE, put(3, TEXT, "robot/scan"))
+        self.until_subscribed(group, 2)
+
+    def test_services_shows_what_subscribers_of_all_hubs_missed(self):
+        group = self.robot.advertise("scan")[3]
+        near, far, most = self.viewer(self.first, "a"), self.viewer(self.last, "b"), self.viewer(self.last, "c")
+        for viewer, missed in ((near, 3), (far, 5), (most, 80)):
+            viewer.flow(MISSED, struct.pack("<IQ", group, missed))
+        wanted = 88, f"3.{most.id & 0xFFFFF}"
+
+        def shown(hub):
+            (service,) = self.services(hub)
+            return service["missed"], service.get("missed_most")
+        for hub in (self.first, self.middle, self.last):
+            wait_until(lambda hub=hub: shown(hub) == wanted, "what was missed at all hubs")
+        self.assertIn("88 (most: " + wanted[1], run_gimnet(self.middle, "services").out.decode())
 
     def test_a_subscriber_that_was_there_before_the_service(self):
         viewer = self.stranger(self.last, "viewer")

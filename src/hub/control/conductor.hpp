@@ -141,7 +141,7 @@ class Conductor final : private Administration {
   void carry_out(const Effects& effects, std::chrono::milliseconds now) {
     runner_.carry_out(effects, now);
     if (links_ == nullptr) return;
-    links_->send_joins();
+    links_->send_joins(now);
     runner_.carry_out(groups_.take_effects(), now);
   }
   /// Carries out what follows from names and groups of other hubs.

@@ -19,7 +19,7 @@ std::uint16_t clamped(std::uint32_t messages) {
 }
 
 /// The widest terms of all subscribers here. Those without terms want everything.
-JoinTerms wish_of(const Topic& topic) {
+JoinTerms terms_of(const Topic& topic) {
   JoinTerms wish;
   if (topic.terms.size() < topic.subscribers.size()) return wish;
   bool first = true;
@@ -28,6 +28,10 @@ JoinTerms wish_of(const Topic& topic) {
     wish = std::exchange(first, false) ? terms : widest(wish, terms);
   }
   return wish;
+}
+
+JoinWish wish_of(const Topic& topic) {
+  return {terms_of(topic), std::max(1u, static_cast<std::uint32_t>(topic.subscribers.size()))};
 }
 
 }  // namespace
@@ -136,9 +140,10 @@ void GroupLinks::end_link(LinkNumber link) {
   for (const GroupId group : trees_.take_changed()) note_away(group);
 }
 
-std::vector<Sending> GroupLinks::take_sendings() {
+std::vector<Sending> GroupLinks::take_sendings(milliseconds now) {
   for (const GroupId group : trees_.take_changed()) note_away(group);
-  return trees_.take_sendings();
+  for (const GroupId group : trees_.take_recounted()) count_subscribers(group);
+  return trees_.take_sendings(now);
 }
 
 void GroupLinks::note_away(GroupId group) {
@@ -237,10 +242,21 @@ void GroupLinks::put_links(GroupId group) {
     }
   }
   change.carry_out();
-  if (own)
-    parts_.membership.topics().set_links(group_index_of(group),
-                                         static_cast<std::uint32_t>(members.size()), effects_);
   if (members.empty()) members_.erase(group);
+  count_subscribers(group);
+}
+
+void GroupLinks::count_subscribers(GroupId group) {
+  if (hub_of(group) != parts_.facts.id) return;
+  std::uint32_t afar = 0;
+  const auto members = members_.find(group);
+  const auto* const branches = trees_.branches(group);
+  if (members != members_.end() && branches != nullptr) {
+    for (const auto& [link, branch] : *branches) {
+      if (members->second.contains(link)) afar = add_subscribers(afar, branch.subscribers);
+    }
+  }
+  parts_.membership.topics().set_afar(group_index_of(group), afar, effects_);
 }
 
 bool GroupLinks::hold(GroupId group, ShardIndex shard, SendControlCommand& answer,
@@ -259,7 +275,9 @@ void GroupLinks::release(milliseconds now) {
 }
 
 std::optional<milliseconds> GroupLinks::next_due() const {
-  return waiting_.empty() ? std::nullopt : std::optional{waiting_.front().until};
+  const std::optional<milliseconds> counts = trees_.next_due();
+  if (waiting_.empty()) return counts;
+  return std::min(counts.value_or(milliseconds::max()), waiting_.front().until);
 }
 
 }  // namespace gimnet::hub

@@ -49,7 +49,7 @@ class GroupLinks {
   void end_link(LinkNumber link);
   void set_next_hops(const NetworkMap& map) { trees_.set_next_hops(map.next_hops()); }
   /// Publishes what changed, and says what follows from it.
-  [[nodiscard]] std::vector<Sending> take_sendings();
+  [[nodiscard]] std::vector<Sending> take_sendings(std::chrono::milliseconds now);
 
   // For the rest of the conductor
 
@@ -110,6 +110,8 @@ class GroupLinks {
   void set_keeper(GroupId group, const std::optional<TablePublisher::AwayGroup>& away);
   [[nodiscard]] Stream stream_of(GroupId group) const;
   void put_links(GroupId group);
+  /// Has the provider of a group of this hub told of the subscribers behind its links.
+  void count_subscribers(GroupId group);
   [[nodiscard]] const Neighbour* find(LinkNumber link) const;
 
   const Parts parts_;

@@ -292,7 +292,7 @@ void Links::advance(Moment moment) {
     wiring_.names.set_reachable(network_.map(), network_.store(), moment.now);
     wiring_.groups.set_next_hops(network_.map());
   }
-  send_joins();
+  send_joins(moment.now);
   send_all(wiring_.names.take_sendings(moment.now));
   if (const Verdict verdict = network_.verdict(); verdict != Verdict::stay)
     leave_network(verdict, moment);

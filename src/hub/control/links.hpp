@@ -83,7 +83,7 @@ class Links {
   /// The id to begin anew with, once another hub was found to keep the one that this hub drew.
   [[nodiscard]] std::optional<HubId> redrawn() const { return redrawn_; }
   /// Says what subscriptions changed.
-  void send_joins() { send_all(wiring_.groups.take_sendings()); }
+  void send_joins(std::chrono::milliseconds now) { send_all(wiring_.groups.take_sendings(now)); }
 
   [[nodiscard]] NextHops& next_hops() { return next_hops_; }
   [[nodiscard]] const NetworkState& network() const { return network_; }

@@ -1,12 +1,14 @@
 #include "proto/control/route_groups.hpp"
 
+#include <algorithm>
+
 #include "base/endian.hpp"
 
 namespace gimnet::proto::route {
 namespace {
 
 namespace join_key {
-enum : std::uint32_t { groups = 1, anew };
+enum : std::uint32_t { groups = 1, anew, subscribers };
 }  // namespace join_key
 
 // An entry of JOIN on the wire: {u32 group id, u32 interval, u16 depth, u16 window}.
@@ -67,6 +69,15 @@ void Join::write(bitestream::Writer& writer) const {
   }
   writer.put_opaque(join_key::groups, list);
   if (anew) writer.put_bool(join_key::anew, true);
+  // A hub that is told nothing takes 1 for each.
+  if (std::ranges::all_of(groups, [](const Entry& each) { return each.subscribers == 1; })) return;
+  list.resize(groups.size() * sizeof(std::uint32_t));
+  next = list.data();
+  for (const Entry& each : groups) {
+    store_le(next, each.subscribers);
+    next += sizeof(std::uint32_t);
+  }
+  writer.put_opaque(join_key::subscribers, list);
 }
 
 Join Join::read(Fields& fields) {
@@ -81,6 +92,20 @@ Join Join::read(Fields& fields) {
     if (join.groups.back().terms.depth == 0) fields.fail("has a depth of 0");
   }
   join.anew = fields.flag(join_key::anew, "wish for last messages", false);
+  if (!fields.has(join_key::subscribers)) return join;
+  const auto numbers = fields.opaque(join_key::subscribers, "list of subscribers",
+                                     kGroupsMax * sizeof(std::uint32_t));
+  if (fields.failed()) return join;
+  if (numbers.size() != join.groups.size() * sizeof(std::uint32_t)) {
+    fields.fail("has not one number of subscribers for each group");
+    return join;
+  }
+  const std::byte* number = numbers.data();
+  for (Entry& each : join.groups) {
+    each.subscribers = load_le<std::uint32_t>(number);
+    number += sizeof(std::uint32_t);
+    if (each.subscribers == 0) fields.fail("joins a group for nobody");
+  }
   return join;
 }
 

@@ -30,6 +30,7 @@ struct Join {
   struct Entry {
     GroupId group;
     JoinTerms terms;
+    std::uint32_t subscribers = 1;  ///< at the sender and behind it, at least 1
     friend bool operator==(const Entry&, const Entry&) = default;
   };
   std::vector<Entry> groups;  ///< 1 to kGroupsMax

@@ -10,6 +10,7 @@ namespace {
 
 namespace route = proto::route;
 using namespace std::chrono_literals;
+using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
@@ -47,7 +48,7 @@ class GroupLinksTest : public ::testing::Test {
   template <class Message>
   std::vector<Sending> take(LinkNumber link, const Message& message) {
     groups().take(link, proto::encode(message));
-    return groups().take_sendings();
+    return groups().take_sendings(0ms);
   }
   std::vector<Sending> join(LinkNumber link, GroupId group, JoinTerms terms = {}) {
     return take(link, route::Join{{{group, terms}}, true});
@@ -83,6 +84,44 @@ TEST_F(GroupLinksTest, ALinkIsAMemberOfAGroupThatItJoinedOnce) {
   static_cast<void>(take(kDown, route::Leave{{kOwnGroup}}));
   EXPECT_EQ(members(kOwnGroup)->by_shard[0].size(), 0u);
   EXPECT_EQ(rig_.membership.topics().find("robot/scan")->subscriber_count(), 0u);
+}
+
+TEST_F(GroupLinksTest, AProviderHearsOfAllSubscribersBehindALink) {
+  advertise();
+  const auto count = [&] {
+    return rig_.membership.topics().find("robot/scan")->subscriber_count();
+  };
+  static_cast<void>(take(kDown, route::Join{{{kOwnGroup, {}, 40}}, true}));
+  EXPECT_EQ(count(), 40u);
+  static_cast<void>(take(kUp, route::Join{{{kOwnGroup, {}, 2}}, true}));
+  EXPECT_EQ(count(), 42u);
+  static_cast<void>(groups().take_effects());
+  const GroupMembers* const published = members(kOwnGroup);
+  static_cast<void>(take(kDown, route::Join{{{kOwnGroup, {}, 41}}, false}));
+  EXPECT_EQ(count(), 43u);
+  EXPECT_THAT(groups().take_effects(), SizeIs(1));
+  EXPECT_EQ(members(kOwnGroup), published) << "only the number changed";
+  static_cast<void>(take(kUp, route::Join{{{kOwnGroup, {}, UINT32_MAX}}, false}));
+  EXPECT_EQ(count(), UINT32_MAX) << "a hub may say anything";
+  groups().end_link(kUp);
+  EXPECT_EQ(count(), 41u);
+}
+
+TEST_F(GroupLinksTest, PassesTheSumOfSubscribersOn) {
+  const auto said = [](const std::vector<Sending>& sendings) {
+    std::vector<std::uint32_t> numbers;
+    for (const Sending& each : sendings) {
+      if (const auto join = proto::decode<route::Join>(*each.bytes))
+        numbers.push_back(join->groups.at(0).subscribers);
+    }
+    return numbers;
+  };
+  groups().take(kDown, proto::encode(route::Join{{{kAwayGroup, {}, 40}}, true}));
+  EXPECT_THAT(said(groups().take_sendings(0ms)), ElementsAre(40));
+  groups().take(kDown, proto::encode(route::Join{{{kAwayGroup, {}, 41}}, false}));
+  EXPECT_THAT(said(groups().take_sendings(10ms)), IsEmpty());
+  EXPECT_EQ(groups().next_due(), 110ms);
+  EXPECT_THAT(said(groups().take_sendings(110ms)), ElementsAre(41));
 }
 
 TEST_F(GroupLinksTest, AJoinWaitsForAGroupThatDoesNotExist) {

@@ -23,7 +23,8 @@ enum class Checker : std::uint8_t {
   moves,         ///< a node that goes to another hub has its name there at once
   one_owner,     ///< of connected hubs one has a name, and all say so
   parents,       ///< a group of another hub comes from the next hop towards that hub
-  subscribers,   ///< a new subscriber at any hub gets the last message, and those that follow
+  subscribers,   ///< a new subscriber at any hub gets the last message, and those that follow, and
+                 ///< counts at the provider
   acceptors,     ///< all hubs tell whether a service that accepts is away
   resumes,       ///< nobody stays paused or held
   ledgers,       ///< each hub's ledger is exact, and those of both ends of a link agree

@@ -71,12 +71,33 @@ void Settled::check_groups() {
   world_.run_until(world_.now() + way);
   check("the next message");
   check_parents(true);
+  check_counts(all);
   check_missed(all);
 }
 
 bool Settled::is_near(const SimNode& person, const Given& each) const {
   const int links = distance_[person.plan().hub][each.node->at()];
   return person.is_up() && links >= 0 && links <= proto::kHopsMax;
+}
+
+/// The provider's hub counts the subscribers at all hubs that the service reaches.
+void Settled::check_counts(const std::vector<Given>& all) const {
+  for (const Given& each : all) {
+    std::size_t sum = 0;
+    for (std::size_t hub = 0; hub < distance_.size(); ++hub) {
+      const int links = distance_[hub][each.node->at()];
+      if (links < 0 || links > proto::kHopsMax) continue;
+      const hub::Topic* const topic = world_.machines_[hub].hub->topics().find_group(each.group);
+      if (topic != nullptr) sum += topic->subscribers.size();
+    }
+    const hub::Topics& own = world_.machines_[each.node->at()].hub->topics();
+    const hub::Topic* const topic = own.find_group(each.group);
+    const std::uint32_t counted = topic == nullptr ? 0 : topic->subscriber_count();
+    if (counted != sum)
+      broken(Checker::subscribers, "group " + to_string(each.group) + " counts " +
+                                       std::to_string(counted) + " subscribers, and has " +
+                                       std::to_string(sum));
+  }
 }
 
 /// Each operator is the only one at its hub that says what it missed.

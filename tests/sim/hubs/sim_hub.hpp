@@ -69,6 +69,7 @@ class SimHub {
 
   [[nodiscard]] const hub::HubFacts& facts() const { return setup_.facts; }
   [[nodiscard]] const hub::Links& links() const { return *conductor_.links(); }
+  [[nodiscard]] const hub::Topics& topics() const { return conductor_.membership().topics(); }
   [[nodiscard]] const hub::RouteTable& routes() const { return routes_; }
   [[nodiscard]] const hub::GroupTable& groups() const { return groups_; }
   [[nodiscard]] hub::ShardState& shard() { return shard_.state(); }

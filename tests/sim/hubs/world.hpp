@@ -167,6 +167,7 @@ class Settled {
   void check_groups();
   /// May that operator subscribe to it?
   [[nodiscard]] bool is_near(const SimNode& person, const Given& each) const;
+  void check_counts(const std::vector<Given>& all) const;
   void check_missed(const std::vector<Given>& all);
   void check_acceptors();
   void compare_acceptors(const char* when);

@@ -64,9 +64,9 @@ class Links(Case):
     def route(self, link, operation, body=b""):
         link.write(ROUTE, body=struct.pack("<HH", operation, 0) + body)
 
-    def joined(self, link, group):
+    def joined(self, link, group, subscribers=b""):
         """Joins, and waits for the answer."""
-        self.route(link, JOIN, put(1, OPAQUE, struct.pack("<III", group, 0, 1)) + put(2, BOOL, True))
+        self.route(link, JOIN, put(1, OPAQUE, struct.pack("<III", group, 0, 1)) + put(2, BOOL, True) + subscribers)
         head = struct.pack("<HH", JOINED, 0)
         got = link.wait(lambda frame: frame.kind == ROUTE and frame.body[:4] == head)
         self.assertEqual(fields(got.body[4:])[1], struct.pack("<I", group))
@@ -85,6 +85,23 @@ class Links(Case):
         self.route(link, LEAVE, put(1, OPAQUE, struct.pack("<I", group)))
         self.assertEqual(robot.event(33)[4], 0)
         self.route(link, JOINS_END)
+
+    def test_a_provider_counts_the_subscribers_that_a_hub_says(self):
+        robot = self.stranger(self.to, "robot")
+        group = robot.advertise("scan")[3]
+        link = self.link()
+        self.route(link, RECORDS_END)
+        self.joined(link, group, put(3, OPAQUE, struct.pack("<I", 40)))
+        self.assertEqual(robot.event(33)[4], 40)
+        self.stranger(self.to, "viewer").subscribe("robot/scan")
+        self.assertEqual(robot.event(33)[4], 41)
+        join = put(1, OPAQUE, struct.pack("<III", group, 0, 1))
+        for wrong in (b"\0" * 4, b"\1" * 3, b"\1" * 8):
+            self.route(link, JOIN, join + put(3, OPAQUE, wrong))
+        self.route(link, JOIN, join + put(3, OPAQUE, struct.pack("<I", 0xFFFFFFFF)))
+        self.assertEqual(robot.event(33)[4], 0xFFFFFFFF, "of a liar, and no more than a number can be")
+        self.joined(link, group)
+        self.assertEqual(robot.event(33)[4], 2, "a hub that says nothing has one")
 
     def test_lies_about_groups_cost_others_nothing(self):
         robot = self.stranger(self.to, "robot")

@@ -31,6 +31,7 @@ class Run {
     for (std::uint32_t choice = 0; choice < kGroups; ++choice) {
       if (hub_of(group(choice)) != kSelf) trees_.want(group(choice), std::nullopt);
     }
+    own_.clear();
     say();
     FUZZ_MUST(trees_.size() == 0);
   }
@@ -48,7 +49,11 @@ class Run {
             static_cast<std::uint16_t>(choices_.below(3))};
   }
 
+  /// Some are as large as they can be. No choice: the seeds mean what they meant.
+  std::uint32_t number() { return ++numbers_ % 7 == 0 ? UINT32_MAX - 1 : numbers_ % 5 + 1; }
+
   void one() {
+    now_ += std::chrono::milliseconds{30};
     const LinkNumber link{choices_.below(kLinks) + 1};
     const GroupId wanted = group(choices_.byte());
     switch (choices_.below(8)) {
@@ -60,7 +65,7 @@ class Run {
         end(link);
         break;
       case 2:
-        trees_.take(link, route::Join{{{wanted, terms()}}, choices_.below(2) != 0});
+        trees_.take(link, route::Join{{{wanted, terms(), number()}}, choices_.below(2) != 0});
         break;
       case 3:
         trees_.take(link, route::Leave{{wanted}});
@@ -73,7 +78,9 @@ class Run {
         break;
       case 6:
         if (hub_of(wanted) == kSelf) break;
-        trees_.want(wanted, choices_.below(3) != 0 ? std::optional{terms()} : std::nullopt);
+        own_.erase(wanted);
+        if (choices_.below(3) != 0) own_[wanted] = {terms(), number()};
+        trees_.want(wanted, own_.contains(wanted) ? std::optional{own_[wanted]} : std::nullopt);
         break;
       default: {
         std::array<LinkNumber, NetworkMap::kHubIds> next_hops{};
@@ -87,15 +94,19 @@ class Run {
   void end(LinkNumber link) {
     trees_.end_link(link);
     joined_[link].clear();
+    said_[link].clear();
   }
   /// The other sides keep what they are told.
   void say() {
     static_cast<void>(trees_.take_changed());
-    for (const Sending& each : trees_.take_sendings()) {
+    static_cast<void>(trees_.take_recounted());
+    for (const Sending& each : trees_.take_sendings(now_)) {
       std::set<GroupId>& joined = joined_[each.link];
       if (const auto join = proto::decode<route::Join>(*each.bytes)) {
-        for (const auto& entry : join->groups)
+        for (const auto& entry : join->groups) {
           FUZZ_MUST(joined.insert(entry.group).second == join->anew);
+          said_[each.link][entry.group] = entry.subscribers;
+        }
       } else if (const auto leave = proto::decode<route::Leave>(*each.bytes)) {
         for (const GroupId left : leave->groups) FUZZ_MUST(joined.erase(left) == 1);
       } else if (const auto answer = proto::decode<route::Joined>(*each.bytes)) {
@@ -105,14 +116,26 @@ class Run {
         FUZZ_MUST(proto::decode<route::JoinsEnd>(*each.bytes));
       }
     }
-    FUZZ_MUST(trees_.take_sendings().empty());
+    FUZZ_MUST(trees_.take_sendings(now_).empty());
   }
-  /// Each group is joined at its parent, and nowhere else.
+  /// The subscribers here, and behind all links but that one.
+  std::uint32_t subscribers(GroupId group, LinkNumber parent) const {
+    std::uint64_t sum = own_.contains(group) ? own_.at(group).subscribers : 0;
+    for (const auto& [link, branch] : *trees_.branches(group))
+      if (link != parent) sum += branch.subscribers;
+    return static_cast<std::uint32_t>(std::min<std::uint64_t>(sum, UINT32_MAX));
+  }
+  /// Each group is joined at its parent, and nowhere else. Numbers that were said are right, or
+  /// there are some to be said.
   void look() {
     for (std::uint32_t choice = 0; choice < kGroups; ++choice) {
       for (std::uint32_t link = 1; link <= kLinks; ++link) {
         const bool there = joined_[LinkNumber{link}].contains(group(choice));
         FUZZ_MUST(there == (trees_.parent(group(choice)) == LinkNumber{link}));
+        if (!there) continue;
+        const LinkNumber parent{link};
+        const bool right = said_[parent][group(choice)] == subscribers(group(choice), parent);
+        FUZZ_MUST(right || (trees_.next_due() && *trees_.next_due() > now_));
       }
     }
   }
@@ -120,6 +143,10 @@ class Run {
   fuzz::Choices choices_;
   GroupTrees trees_{kSelf};
   std::map<LinkNumber, std::set<GroupId>> joined_;
+  std::map<LinkNumber, std::map<GroupId, std::uint32_t>> said_;
+  std::map<GroupId, JoinWish> own_;
+  std::chrono::milliseconds now_{0};
+  std::uint32_t numbers_ = 0;
 };
 
 }  // namespace

@@ -254,7 +254,7 @@ void Topics::leave_group(Topic& topic, milliseconds now, Effects& effects) {
   topic.once_plain.clear();
   topic.once_paced.clear();
   topic.service.reset();
-  topic.links = 0;
+  topic.afar = 0;
   groups_.erase(group);
   group_indices_.give_back(group.value(), now);
   effects.emplace_back(GroupChanged{group});
@@ -334,10 +334,10 @@ void Topics::note_moved(std::string_view full_name, const std::optional<AwayServ
   tell_subscribers(topic, effects, true);
 }
 
-void Topics::set_links(GroupIndex group, std::uint32_t links, Effects& effects) {
+void Topics::set_afar(GroupIndex group, std::uint32_t subscribers, Effects& effects) {
   const auto found = groups_.find(group);
-  if (found == groups_.end() || found->second->links == links) return;
-  found->second->links = links;
+  if (found == groups_.end() || found->second->afar == subscribers) return;
+  found->second->afar = subscribers;
   effects.emplace_back(SubscribersChanged{std::string{found->second->full_name}});
 }
 

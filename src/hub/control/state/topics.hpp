@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <functional>
@@ -66,7 +67,7 @@ struct Topic {
   std::uint64_t change = 0;  ///< number of the last one that subscribers were told; 0: none
   std::uint64_t orphan = 0;  ///< since when, in order, nobody provides the group; 0: somebody does
   std::uint64_t unused = 0;  ///< since when nobody has subscribed either; 0: it is used
-  std::uint32_t links = 0;   ///< that lead to subscribers at other hubs
+  std::uint32_t afar = 0;    ///< subscribers at other hubs, as those say
   /// Messages that subscribers said they missed, of those that missed some.
   std::unordered_map<NodeIndex, std::uint64_t> missed;
 
@@ -76,9 +77,10 @@ struct Topic {
   [[nodiscard]] bool retains() const {
     return service ? service->terms.retain : away && away->retain;
   }
-  /// As the provider counts them: a link is one.
+  /// Here and at other hubs, at most 2^32-1.
   [[nodiscard]] std::uint32_t subscriber_count() const {
-    return static_cast<std::uint32_t>(subscribers.size()) + links;
+    return static_cast<std::uint32_t>(
+        std::min<std::uint64_t>(subscribers.size() + std::uint64_t{afar}, UINT32_MAX));
   }
   /// The pace that the shards keep for that subscriber; nothing if it gets everything.
   [[nodiscard]] std::optional<SubscriberTerms> pace_of(NodeIndex subscriber) const;
@@ -142,8 +144,8 @@ class Topics {
   /// that subscribed to it are told, and get its messages. `away`: if it gives data.
   void note_moved(std::string_view full_name, const std::optional<AwayService>& away,
                   std::chrono::milliseconds now, Effects& effects);
-  /// So many links lead to subscribers of that group of this hub.
-  void set_links(GroupIndex group, std::uint32_t links, Effects& effects);
+  /// So many subscribers at other hubs has that group of this hub.
+  void set_afar(GroupIndex group, std::uint32_t subscribers, Effects& effects);
 
   /// Grows with each ServiceChanged.
   [[nodiscard]] std::uint64_t changes() const { return changes_; }

@@ -90,10 +90,13 @@ void GroupTrees::take(LinkNumber link, const route::Join& join) {
     if (tree == trees_.end()) tree = trees_.try_emplace(entry.group).first;
     GroupBranch& branch = tree->second.branches[link];
     if (!known) ++joins;
+    const bool recounts = known && !branch.stale && !join.anew && branch.terms == entry.terms;
     branch.terms = entry.terms;
+    branch.subscribers = entry.subscribers;
     branch.anew = branch.anew || join.anew;
     branch.stale = branch.told = false;
-    note(entry.group);
+    unsaid_.insert(entry.group);
+    (recounts ? recounted_ : changed_).insert(entry.group);
   }
 }
 
@@ -142,14 +145,16 @@ void GroupTrees::remove_branch(Trees::iterator tree, LinkNumber link) {
   note(tree->first);
 }
 
-void GroupTrees::want(GroupId group, std::optional<JoinTerms> terms) {
+void GroupTrees::want(GroupId group, std::optional<JoinWish> own) {
   GIMNET_CHECK(hub_of(group) != self_);
   const auto tree = trees_.find(group);
-  if (tree == trees_.end() && !terms) return;
+  if (tree == trees_.end() && !own) return;
   Tree& wanted = tree != trees_.end() ? tree->second : trees_[group];
-  if (wanted.own == terms) return;
-  wanted.own = terms;
-  note(group);
+  if (wanted.own == own) return;
+  const bool recounts = wanted.own && own && wanted.own->terms == own->terms;
+  wanted.own = own;
+  if (!recounts) changed_.insert(group);
+  unsaid_.insert(group);
 }
 
 void GroupTrees::want_anew(GroupId group) {
@@ -189,15 +194,19 @@ bool GroupTrees::is_joined(GroupId group) const {
   return tree != trees_.end() && tree->second.said_to != LinkNumber{} && tree->second.answered;
 }
 
-std::optional<JoinTerms> GroupTrees::wish(const Tree& tree, LinkNumber parent) const {
-  std::optional<JoinTerms> all = tree.own;
+std::optional<JoinWish> GroupTrees::wish(const Tree& tree, LinkNumber parent) const {
+  std::optional<JoinWish> all = tree.own;
   for (const auto& [link, branch] : tree.branches) {
-    if (link != parent) all = all ? widest(*all, branch.terms) : branch.terms;
+    if (link == parent) continue;
+    const JoinWish behind{branch.terms, branch.subscribers};
+    all = all ? JoinWish{widest(all->terms, behind.terms),
+                         add_subscribers(all->subscribers, behind.subscribers)}
+              : behind;
   }
   return all;
 }
 
-std::vector<Sending> GroupTrees::take_sendings() {
+std::vector<Sending> GroupTrees::take_sendings(std::chrono::milliseconds now) {
   Batches batches;
   for (const GroupId group : std::exchange(unsaid_, {})) {
     const auto tree = trees_.find(group);
@@ -205,6 +214,8 @@ std::vector<Sending> GroupTrees::take_sendings() {
     say(group, tree->second, batches);
     if (!tree->second.own && tree->second.branches.empty()) trees_.erase(tree);
   }
+  if (counts_due_ && now >= *counts_due_) say_counts(batches);
+  if (!uncounted_.empty() && !counts_due_) counts_due_ = now + kCountPause;
   return batches.encode(std::exchange(begun_, {}));
 }
 
@@ -215,10 +226,14 @@ void GroupTrees::say(GroupId group, Tree& tree, Batches& batches) {
     const bool moved = to != tree.said_to;
     if (moved && tree.said_to != LinkNumber{}) batches.leave(tree.said_to, group);
     if (to != LinkNumber{}) {
-      const JoinTerms terms = *wish(tree, to);
+      const JoinWish wanted = *wish(tree, to);
       const bool anew = std::exchange(tree.anew, false) || moved;
-      if (anew || terms != tree.said) batches.join(to, {group, terms}, anew);
-      tree.said = terms;
+      if (anew || wanted.terms != tree.said.terms) {
+        batches.join(to, {group, wanted.terms, wanted.subscribers}, anew);
+        tree.said = wanted;
+      } else if (wanted != tree.said) {
+        uncounted_.insert(group);
+      }
     }
     if (moved) tree.answered = false;
     tree.said_to = to;
@@ -226,6 +241,19 @@ void GroupTrees::say(GroupId group, Tree& tree, Batches& batches) {
   if (!own && !tree.answered) return;
   for (auto& [link, branch] : tree.branches) {
     if (!std::exchange(branch.told, true)) batches.joined(link, group);
+  }
+}
+
+/// Others were told with new terms meanwhile, or are wanted no more.
+void GroupTrees::say_counts(Batches& batches) {
+  counts_due_.reset();
+  for (const GroupId group : std::exchange(uncounted_, {})) {
+    const auto tree = trees_.find(group);
+    if (tree == trees_.end() || tree->second.said_to == LinkNumber{}) continue;
+    const std::optional<JoinWish> wanted = wish(tree->second, tree->second.said_to);
+    if (!wanted || wanted == tree->second.said) continue;
+    batches.join(tree->second.said_to, {group, wanted->terms, wanted->subscribers}, false);
+    tree->second.said = *wanted;
   }
 }
 
