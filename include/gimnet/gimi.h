@@ -249,14 +249,16 @@ GIMNET_API gimi_status gimi_watch_receive(gimi_handle watch, int32_t timeout_ms,
 
 /** The questions of gimi_hub(); they are answered by one gimi_hub_record, gimi_counter_records,
  * gimi_connection_records (ascending ids), gimi_network_hub_records (ascending ids),
- * gimi_link_records. */
+ * gimi_link_records, gimi_service_records (ascending group ids): the hub's own services, and those
+ * of other hubs of which subscribers at this hub missed messages. */
 typedef int32_t gimi_hub_question;
 enum {
   GIMI_HUB = 0,
   GIMI_HUB_COUNTERS = 1,
   GIMI_HUB_CONNECTIONS = 2,
   GIMI_HUB_NETWORK = 3,
-  GIMI_HUB_LINKS = 4
+  GIMI_HUB_LINKS = 4,
+  GIMI_HUB_MISSED = 5
 };
 /** Asks a hub of the network; hub_id 0 is the own one. Errors also: GIMI_NOT_FOUND (there is no way
  * to that hub). */

@@ -95,6 +95,7 @@ typedef struct gimi_connection_record {
   uint64_t missed;         /**< Messages that its subscriptions missed, as it says. */
   uint8_t connected;
   uint8_t reserved[7];
+  uint64_t queue_full; /**< Of those dropped, since its queue was full. */
 } gimi_connection_record;
 
 /** A link of a hub, as that hub tells. It keeps its members: what comes later of a link gets an
@@ -136,10 +137,11 @@ typedef struct gimi_link_record {
   uint64_t queued_bytes;
   uint64_t sent_bytes;
   uint64_t received_bytes;
-  uint64_t accepted;  /**< Messages' frames from it. */
-  uint64_t delivered; /**< Frames that the other side confirmed. */
-  uint64_t dropped;   /**< Frames for it. */
-  uint64_t unsure;    /**< Of these, those that may have arrived. */
+  uint64_t accepted;   /**< Messages' frames from it. */
+  uint64_t delivered;  /**< Frames that the other side confirmed. */
+  uint64_t dropped;    /**< Frames for it. */
+  uint64_t unsure;     /**< Of these, those that may have arrived. */
+  uint64_t queue_full; /**< Of those dropped, since its queue was full. */
 } gimi_link_record;
 
 /** A key of the hub's configuration whose value is another one now, as its file writes them. */

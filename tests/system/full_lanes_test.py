@@ -53,6 +53,8 @@ class Flooded(unittest.TestCase):
         for _ in range(4):
             publish(20000)
         wait_until(lambda: hub.counter("dropped.queue_full") > 0, "a full lane")
+        whose = rf"dropped\.queue_full: (\d+)\n    for node {re.escape(reader)}: \1\n"
+        wait_until(lambda: re.search(whose, run_gimnet(hub, "status").out.decode()), "the status to name the reader")
         echo.signal(signal.SIGCONT)
         flooder_id = f"{flooder.id >> 20}.{flooder.id & 0xFFFFF}"
         said = ("messages of r/s did not come: the queue of this reader at the hub was full, mostly of what "

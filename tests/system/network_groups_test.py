@@ -9,7 +9,7 @@ import unittest
 
 from stranger_parts.bitestream import BOOL, F64, TEXT, U32, every, fields, put
 from stranger_parts.case import PATIENT, Case
-from stranger_parts.client import BROADCAST, CTRL, GROUP, LIST, NS, UNICAST
+from stranger_parts.client import BROADCAST, CTRL, GROUP, LIST, MISSED, NS, UNICAST
 from support.processes import run_gimnet
 from support.waiting import wait_until
 

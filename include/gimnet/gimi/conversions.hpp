@@ -166,7 +166,7 @@ using SharedHandle = std::shared_ptr<const Handle>;
   return {Peer{found.node},     found.name,           found.shard,        found.transport,
           found.peer,           found.connected != 0, found.queued_bytes, found.accepted,
           found.received_bytes, found.delivered,      found.sent_bytes,   found.dropped,
-          found.missed};
+          found.missed,         found.queue_full};
 }
 
 [[nodiscard]] inline NetworkHub record_of(const gimi_network_hub_record& found) {
@@ -191,7 +191,7 @@ using SharedHandle = std::shared_ptr<const Handle>;
           found.dialled != 0,   found.cost,         found.rtt_us,     found.clock_offset_ns,
           found.clock_error_ns, found.queued_bytes, found.sent_bytes, found.received_bytes,
           found.accepted,       found.delivered,    found.dropped,    found.unsure,
-          found.last_error};
+          found.last_error,     found.queue_full};
 }
 
 [[nodiscard]] inline HubChange record_of(const gimi_hub_change_record& found) {

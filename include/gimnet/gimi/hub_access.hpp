@@ -54,6 +54,14 @@ class HubAccess {
       return gimi_hub(handle_, GIMI_HUB_LINKS, hub_id, milliseconds_of(timeout), list);
     });
   }
+  /// The hub's own services, and those of other hubs of which subscribers at this hub missed
+  /// messages: ServiceRecord::missed of each is about subscribers at this hub.
+  Outcome<std::vector<ServiceRecord>> hub_missed(Timeout timeout = Timeout{5000},
+                                                 std::uint32_t hub_id = 0) const {
+    return detail::listed<gimi_service_record>([&](gimi_list* list) {
+      return gimi_hub(handle_, GIMI_HUB_MISSED, hub_id, milliseconds_of(timeout), list);
+    });
+  }
 
   // ---- changing the hub, for those who joined as administrators; everybody else is denied
 

@@ -168,11 +168,12 @@ struct LinkRecord {
   std::uint64_t queued_bytes = 0;
   std::uint64_t sent_bytes = 0;
   std::uint64_t received_bytes = 0;
-  std::uint64_t accepted = 0;   ///< messages' frames from it
-  std::uint64_t delivered = 0;  ///< frames that the other side confirmed
-  std::uint64_t dropped = 0;    ///< frames for it
-  std::uint64_t unsure = 0;     ///< of these, those that may have arrived
-  std::string last_error;       ///< "": none
+  std::uint64_t accepted = 0;    ///< messages' frames from it
+  std::uint64_t delivered = 0;   ///< frames that the other side confirmed
+  std::uint64_t dropped = 0;     ///< frames for it
+  std::uint64_t unsure = 0;      ///< of these, those that may have arrived
+  std::string last_error;        ///< "": none
+  std::uint64_t queue_full = 0;  ///< of those dropped, since its queue was full
 };
 
 struct ConnectionRecord {
@@ -192,6 +193,7 @@ struct ConnectionRecord {
   std::uint64_t sent_bytes = 0;  ///< that the hub wrote to it
   std::uint64_t dropped = 0;     ///< frames that were for it
   std::uint64_t missed = 0;      ///< messages that its subscriptions missed, as it says
+  std::uint64_t queue_full = 0;  ///< of those dropped, since its queue was full
 };
 
 }  // namespace gimnet::inline GIMNET_GIMI_NAMESPACE

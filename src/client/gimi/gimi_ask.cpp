@@ -103,6 +103,8 @@ gimi_status gimi_hub(gimi_handle node, gimi_hub_question question, uint32_t hub_
       return list_with(node, list, [&](Core& core) { return ask_hubs(who(core), timeout); });
     case GIMI_HUB_LINKS:
       return list_with(node, list, [&](Core& core) { return ask_links(who(core), timeout); });
+    case GIMI_HUB_MISSED:
+      return list_with(node, list, [&](Core& core) { return ask_missed(who(core), timeout); });
     default:
       return fail(GIMI_BAD_ARGUMENT, "there is no such question to a hub");
   }

@@ -7,6 +7,7 @@
 #include "client/gimi/ending.hpp"
 #include "client/gimi/uplink.hpp"
 #include "client/nif/answer_status.hpp"
+#include "client/nif/record_list.hpp"
 #include "proto/control/ctrl_network.hpp"
 #include "proto/control/ns.hpp"
 
@@ -22,11 +23,12 @@ proto::bitestream::Writer body_of(const Request& request) {
 
 /// Asks the hub and reads its answer.
 template <class Answer, class Request>
-Outcome<Answer> ask(Asking who, const Request& request, const std::string& doing, Timeout timeout) {
+Outcome<Answer> ask(Asking who, const Request& request, const std::string& doing, Timeout timeout,
+                    std::uint8_t kind = NIF_CTRL) {
   const auto body = body_of(request);
   nif_reply* reply = nullptr;
   const nif_status status =
-      nif_request_of_hub(who.node, who.hub_id, NIF_CTRL, Request::kOperation, body.bytes().data(),
+      nif_request_of_hub(who.node, who.hub_id, kind, Request::kOperation, body.bytes().data(),
                          body.size(), &reply, nif_timeout(timeout));
   if (status != NIF_OK) return failure_of(status, doing);
   const std::unique_ptr<nif_reply, void (*)(nif_reply*)> owner(reply, &nif_free_reply);
@@ -159,7 +161,7 @@ Outcome<std::vector<ConnectionRecord>> ask_connections(Asking who, Timeout timeo
       records.push_back({Peer{found.node.value()}, found.name, found.shard, found.transport,
                          found.peer, found.connected, counts.queued_bytes, counts.accepted,
                          counts.received_bytes, counts.delivered, counts.sent_bytes, counts.dropped,
-                         counts.missed});
+                         counts.missed, counts.queue_full});
     }
     if (!page->more || page->connections.empty()) return records;
   }
@@ -207,9 +209,25 @@ Outcome<std::vector<LinkRecord>> ask_links(Asking who, Timeout timeout) {
           {link.name, link.hub.value(), link.peer, proto::ctrl::link_state_name(link.state),
            link.dialled, link.cost, link.rtt_us, link.clock_offset_ns, link.clock_error_ns,
            counts.queued_bytes, counts.sent_bytes, counts.received_bytes, counts.accepted,
-           counts.delivered, counts.dropped, counts.unsure, link.last_error});
+           counts.delivered, counts.dropped, counts.unsure, link.last_error, counts.queue_full});
     }
     if (!page->more || page->links.empty()) return records;
+  }
+}
+
+Outcome<std::vector<ServiceRecord>> ask_missed(Asking who, Timeout timeout) {
+  const std::int64_t deadline = deadline_after(timeout);
+  std::vector<ServiceRecord> records;
+  proto::ns::ServicesRequest request;
+  request.missed = true;
+  for (;;) {
+    const auto page =
+        ask<proto::ns::ServicesAnswer>(who, request, "ask the hub for missed messages",
+                                       Timeout{nif_timeout_until(deadline)}, NIF_NS);
+    if (!page) return page.failure();
+    for (const auto& found : page->services) records.push_back(record_of(nif::view_of(found)));
+    if (!page->more || page->next <= request.after) return records;
+    request.after = page->next;
   }
 }
 

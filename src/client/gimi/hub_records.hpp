@@ -38,6 +38,8 @@ struct Asking {
 [[nodiscard]] Outcome<std::vector<ConnectionRecord>> ask_connections(Asking who, Timeout timeout);
 [[nodiscard]] Outcome<std::vector<NetworkHub>> ask_hubs(Asking who, Timeout timeout);
 [[nodiscard]] Outcome<std::vector<LinkRecord>> ask_links(Asking who, Timeout timeout);
+/// Services of which messages were missed there, and the hub's own.
+[[nodiscard]] Outcome<std::vector<ServiceRecord>> ask_missed(Asking who, Timeout timeout);
 
 // For administrators.
 [[nodiscard]] Outcome<std::string> kick(nif_node* node, Peer peer, std::string_view reason,

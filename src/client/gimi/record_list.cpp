@@ -63,6 +63,7 @@ gimi_connection_record record_of(const ConnectionRecord& of) {
   record.dropped = of.dropped;
   record.missed = of.missed;
   record.connected = of.connected ? 1 : 0;
+  record.queue_full = of.queue_full;
   return record;
 }
 
@@ -71,7 +72,7 @@ gimi_link_record record_of(const LinkRecord& of) {
           of.hub_id,          of.cost,           of.rtt_us,        of.dialled ? 1u : 0u,
           of.clock_offset_ns, of.clock_error_ns, of.queued_bytes,  of.sent_bytes,
           of.received_bytes,  of.accepted,       of.delivered,     of.dropped,
-          of.unsure};
+          of.unsure,          of.queue_full};
 }
 
 gimi_hub_change_record record_of(const HubChange& of) {

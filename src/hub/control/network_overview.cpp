@@ -131,6 +131,7 @@ LinkView NetworkOverview::view_of(const HubLink& link) const {
   view.delivered = counts.delivered;
   view.dropped = counts.dropped;
   view.unsure = counts.unsure;
+  view.queue_full = counts.queue_full;
   return view;
 }
 

@@ -25,11 +25,12 @@ struct LinkView {
   std::uint64_t queued_bytes = 0;
   std::uint64_t sent_bytes = 0;
   std::uint64_t received_bytes = 0;
-  std::uint64_t accepted = 0;   ///< data frames from it
-  std::uint64_t delivered = 0;  ///< data frames to it
-  std::uint64_t dropped = 0;    ///< data frames for it
-  std::uint64_t unsure = 0;     ///< of these, those that may have arrived
-  std::string last_error;       ///< of the last attempt or connection; "": none
+  std::uint64_t accepted = 0;    ///< data frames from it
+  std::uint64_t delivered = 0;   ///< data frames to it
+  std::uint64_t dropped = 0;     ///< data frames for it
+  std::uint64_t unsure = 0;      ///< of these, those that may have arrived
+  std::uint64_t queue_full = 0;  ///< of those dropped, those that found its queue full
+  std::string last_error;        ///< of the last attempt or connection; "": none
 };
 
 /// A hub of the network as it is shown to people. A value type.

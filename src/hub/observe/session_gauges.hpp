@@ -21,12 +21,14 @@ struct SessionCounters {
   Counter received_bytes;
   Counter delivered;  ///< frames handed to the kernel for it, or confirmed where resume is on
   Counter sent_bytes;
-  Counter dropped;  ///< frames that were for it
-  Counter unsure;   ///< of these, those that a broken link may have delivered
+  Counter dropped;     ///< frames that were for it
+  Counter unsure;      ///< of these, those that a broken link may have delivered
+  Counter queue_full;  ///< of these, those that found its queue full
 
   /// All counts are 0 again.
   void clear() {
-    for (Counter* each : {&accepted, &received_bytes, &delivered, &sent_bytes, &dropped, &unsure})
+    for (Counter* each :
+         {&accepted, &received_bytes, &delivered, &sent_bytes, &dropped, &unsure, &queue_full})
       each->store(0);
   }
 };
@@ -40,6 +42,7 @@ struct SessionCounts {
   std::uint64_t sent_bytes = 0;
   std::uint64_t dropped = 0;
   std::uint64_t unsure = 0;
+  std::uint64_t queue_full = 0;
 
   SessionCounts& operator+=(const SessionCounts& other) {
     queued_bytes += other.queued_bytes;
@@ -49,6 +52,7 @@ struct SessionCounts {
     sent_bytes += other.sent_bytes;
     dropped += other.dropped;
     unsure += other.unsure;
+    queue_full += other.queue_full;
     return *this;
   }
 };
@@ -89,7 +93,7 @@ class SessionGauges {
     return {queued_[slot.value()].value(),   counters.accepted.value(),
             counters.received_bytes.value(), counters.delivered.value(),
             counters.sent_bytes.value(),     counters.dropped.value(),
-            counters.unsure.value()};
+            counters.unsure.value(),         counters.queue_full.value()};
   }
 
  private:

@@ -134,7 +134,7 @@ bool Attacher::go_on(Connection& connection, const AttachCommand& command, Run& 
   state_.counters.gap_frames.add_within(rewind.lost, kGapFramesMost);
   state_.tally.delivered += rewind.confirmed;
   connection.outbox.counters()->delivered.add(rewind.confirmed);
-  connection.outbox.count_dropped(rewind.lost);
+  connection.outbox.count_dropped(rewind.lost, proto::DropReason::link_lost);
   state_.tally.drop(proto::DropReason::link_lost, rewind.lost);
   state_.tally.queued -= static_cast<std::int64_t>(rewind.confirmed + rewind.lost);
   if (partial.frames != 0) replay.push(std::move(partial));

@@ -148,7 +148,7 @@ void Closer::lose_unconfirmed(Connection& connection, const Run& partial) {
   }
   const std::uint64_t may_have_arrived = lost;
   if (partial.frames != 0) lose(partial, proto::DropReason::link_lost);
-  connection.outbox.count_dropped(lost);
+  connection.outbox.count_dropped(lost, proto::DropReason::link_lost);
   connection.outbox.counters()->unsure.add(may_have_arrived);
   state_.tally.queued -= static_cast<std::int64_t>(lost);
 }

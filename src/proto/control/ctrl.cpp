@@ -134,6 +134,7 @@ void ConnectionsAnswer::write(bitestream::Writer& writer) const {
     writer.put_u64(11, record.counts.sent_bytes);
     writer.put_u64(12, record.counts.dropped);
     if (record.counts.missed != 0) writer.put_u64(13, record.counts.missed);
+    if (record.counts.queue_full != 0) writer.put_u64(14, record.counts.queue_full);
     writer.end_nested();
   }
   writer.put_bool(4, more);
@@ -156,6 +157,8 @@ ConnectionsAnswer ConnectionsAnswer::read(Fields& fields) {
     connection.counts.sent_bytes = record.number<std::uint64_t>(11, "number of sent bytes", 0);
     connection.counts.dropped = record.number<std::uint64_t>(12, "number of dropped frames", 0);
     connection.counts.missed = record.number<std::uint64_t>(13, "number of missed messages", 0);
+    connection.counts.queue_full =
+        record.number<std::uint64_t>(14, "number of frames for a full queue", 0);
     return connection;
   });
   answer.more = fields.flag(4, "more", false);

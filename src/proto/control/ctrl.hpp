@@ -126,8 +126,9 @@ struct ConnectionCounts {
   std::uint64_t received_bytes = 0;
   std::uint64_t delivered = 0;  ///< frames to it
   std::uint64_t sent_bytes = 0;
-  std::uint64_t dropped = 0;  ///< frames to it
-  std::uint64_t missed = 0;   ///< messages, as it says itself of its subscriptions
+  std::uint64_t dropped = 0;     ///< frames to it
+  std::uint64_t missed = 0;      ///< messages, as it says itself of its subscriptions
+  std::uint64_t queue_full = 0;  ///< of those dropped, frames that found its queue full
   friend bool operator==(const ConnectionCounts&, const ConnectionCounts&) = default;
 };
 

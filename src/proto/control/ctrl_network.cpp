@@ -147,6 +147,7 @@ void LinksAnswer::write(bitestream::Writer& writer) const {
     writer.put_u64(16, counts.unsure);
     if (!record.last_error.empty())
       put_clean_text(writer, 17, record.last_error, kSentenceBytesMax);
+    if (counts.queue_full != 0) writer.put_u64(18, counts.queue_full);
     writer.end_nested();
   }
   writer.put_bool(4, more);
@@ -172,6 +173,8 @@ LinksAnswer LinksAnswer::read(Fields& fields) {
     link.counts.dropped = record.number<std::uint64_t>(15, "number of dropped frames", 0);
     link.counts.unsure = record.number<std::uint64_t>(16, "number of unsure frames", 0);
     link.last_error = record.text(17, "last error", kSentenceBytesMax);
+    link.counts.queue_full =
+        record.number<std::uint64_t>(18, "number of frames for a full queue", 0);
     return link;
   });
   answer.more = fields.flag(4, "more", false);

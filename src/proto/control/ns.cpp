@@ -222,12 +222,14 @@ Withdraw Withdraw::read(Fields& fields) {
 
 void ServicesRequest::write(bitestream::Writer& writer) const {
   write_page_request(writer, pattern, after.value(), records_max);
+  if (missed) writer.put_bool(7, true);
 }
 ServicesRequest ServicesRequest::read(Fields& fields) {
   ServicesRequest services;
   services.pattern = fields.text(3, "pattern", kNameBytesMax);
   services.after = read_id<GroupId>(fields, 4, "group id to continue after");
   services.records_max = fields.number<std::uint32_t>(5, "number of records", kPageRecordsDefault);
+  services.missed = fields.flag(7, "wish for missed messages", false);
   return services;
 }
 

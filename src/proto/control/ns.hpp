@@ -201,6 +201,8 @@ struct ServicesRequest {
   std::string pattern;  ///< empty: all
   GroupId after;        ///< continue after this one; 0: from the start
   std::uint32_t records_max = kPageRecordsDefault;
+  /// Besides the hub's own services only those of which its subscribers missed messages.
+  bool missed = false;
   void write(bitestream::Writer& writer) const;
   [[nodiscard]] static ServicesRequest read(Fields& fields);
   friend bool operator==(const ServicesRequest&, const ServicesRequest&) = default;

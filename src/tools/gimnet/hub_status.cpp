@@ -1,10 +1,12 @@
 #include "tools/gimnet/hub_status.hpp"
 
 #include <algorithm>
+#include <functional>
 #include <unordered_map>
 
 #include "tools/gimnet/json_writer.hpp"
 #include "tools/gimnet/member_status.hpp"
+#include "tools/gimnet/missed_afar.hpp"
 #include "tools/gimnet/network.hpp"
 #include "tools/gimnet/session.hpp"
 #include "tools/gimnet/table.hpp"
@@ -14,6 +16,7 @@ namespace gimnet::tool {
 namespace {
 
 constexpr std::string_view kDropped = "dropped.";
+constexpr std::string_view kQueueFull = "dropped.queue_full";
 constexpr std::string_view kRefused = "refused.";
 constexpr std::string_view kLinks = "links.";
 
@@ -71,7 +74,8 @@ void write(JsonWriter& json, const std::vector<ConnectionRecord>& connections) {
     json.member("accepted", connection.accepted)
         .member("received_bytes", connection.received_bytes);
     json.member("delivered", connection.delivered).member("sent_bytes", connection.sent_bytes);
-    json.member("dropped", connection.dropped).member("missed", connection.missed).end_object();
+    json.member("dropped", connection.dropped).member("missed", connection.missed);
+    json.member("queue_full", connection.queue_full).end_object();
   }
   json.end_array();
 }
@@ -142,6 +146,30 @@ std::string text_of(const std::vector<ConnectionRecord>& connections, Paint pain
   return connections_table(connections, paint);
 }
 
+namespace {
+
+/// The nodes and links whose full queues cost frames, those that lost most first.
+std::string full_queues(const HubStatus& status, std::uint64_t all) {
+  std::vector<std::pair<std::uint64_t, std::string>> full;
+  for (const ConnectionRecord& each : status.connections)
+    full.emplace_back(each.queue_full,
+                      "node " + each.node.text() + (each.name.empty() ? "" : " " + each.name));
+  for (const LinkRecord& each : status.links)
+    full.emplace_back(each.queue_full,
+                      "link " + each.name + " to hub " + std::to_string(each.hub_id));
+  std::erase_if(full, [](const auto& each) { return each.first == 0; });
+  if (full.empty()) return "";  // all have left, or the hub is older
+  std::ranges::stable_sort(full, std::greater{}, [](const auto& each) { return each.first; });
+  std::string text;
+  for (const auto& [frames, who] : full) {
+    text += "    for " + printable(who) + ": " + std::to_string(frames) + "\n";
+    all -= std::min(all, frames);
+  }
+  return all == 0 ? text : text + "    for others that have left: " + std::to_string(all) + "\n";
+}
+
+}  // namespace
+
 std::string json_of(const HubStatus& status) {
   const Counters counters = summed(status.shards);
   JsonWriter json;
@@ -151,6 +179,7 @@ std::string json_of(const HubStatus& status) {
   write(json.key("counters"), counters);
   write(json.key("shards"), status.shards);
   write(json.key("connections"), status.connections);
+  write(json.key("links"), status.links);
   return json.end_object().str() + "\n";
 }
 
@@ -164,8 +193,9 @@ std::string text_of(const HubStatus& status, Paint paint) {
       " nodes, " + std::to_string(status.hub.services) + " services\n";
   text += text_of(ledger) + "\n";
   for (const auto& [name, value] : counters) {
-    if (name.starts_with(kDropped) && value != 0)
-      text += paint("  " + name + ": " + std::to_string(value), Tone::bad) + "\n";
+    if (!name.starts_with(kDropped) || value == 0) continue;
+    text += paint("  " + name + ": " + std::to_string(value), Tone::bad) + "\n";
+    if (name == kQueueFull) text += full_queues(status, value);
   }
   text += "mailbox: " + std::to_string(value_of(counters, "mailbox_entries")) + " entries, " +
           std::to_string(value_of(counters, "mailbox_wakeups")) + " wake-ups\n";
@@ -274,8 +304,9 @@ std::string table_of(const std::vector<ServiceRecord>& services, const ProviderI
 
 ExitCode run_services(ToolSession& session) {
   if (const auto ending = session.join_to_look()) return *ending;
-  const auto services = session.node().services(session.options().target);
+  auto services = session.node().services(session.options().target);
   if (!services) return session.fail(services.failure());
+  add_missed_afar(session, *services);
   std::vector<NodeRecord> nodes;
   if (!services->empty()) {
     auto found = session.node().nodes("**");  // services are those of nodes with a name
@@ -300,7 +331,9 @@ ExitCode run_status(ToolSession& session) {
   if (!connections) return session.fail(connections.failure());
   const auto shards = session.node().hub_counters(kHubPatience, hub_id);
   if (!shards) return session.fail(shards.failure());
-  const HubStatus status{*hub, *shards, *connections};
+  const auto links = session.node().hub_links(kHubPatience, hub_id);
+  if (!links) return session.fail(links.failure());
+  const HubStatus status{*hub, *shards, *connections, *links};
   session.output().write(session.options().json ? json_of(status)
                                                 : text_of(status, session.paint()));
   return session.finish();

@@ -18,6 +18,7 @@ struct HubStatus {
   HubRecord hub;
   std::vector<ShardCounts> shards;
   std::vector<ConnectionRecord> connections;
+  std::vector<LinkRecord> links;
 };
 
 using Counters = std::vector<std::pair<std::string, std::uint64_t>>;

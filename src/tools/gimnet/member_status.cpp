@@ -1,11 +1,9 @@
 #include "tools/gimnet/member_status.hpp"
 
 #include <algorithm>
-#include <atomic>
-#include <future>
 
 #include "base/clock.hpp"
-#include "base/signals_blocked.hpp"
+#include "tools/gimnet/ask_each.hpp"
 #include "tools/gimnet/json_writer.hpp"
 #include "tools/gimnet/network.hpp"
 #include "tools/gimnet/session.hpp"
@@ -83,24 +81,13 @@ std::string text_of(const std::vector<MemberStatus>& members, bool exact, Paint 
 
 namespace {
 
-constexpr Timeout kMemberPatience{5000};
-/// No further hub is asked then: very many may be silent.
-constexpr std::int64_t kAskUntilNs = 10'000'000'000;
 /// The last frames of a link are confirmed with its keep-alive (250 ms), so counts of links that
 /// have just become idle agree a moment later.
 constexpr std::int64_t kSettledWithinNs = 1'000'000'000;
 constexpr std::int64_t kAskAgainAfterNs = 100'000'000;
-/// Hubs that are asked at the same time.
-constexpr std::size_t kAskersMax = 16;
 
 MemberStatus ask_member(ToolSession& session, const NetworkHub& hub) {
   MemberStatus member;
-  member.hub_id = hub.hub_id;
-  member.name = hub.name;
-  if (!hub.reachable || hub.too_far) {
-    member.error = hub.too_far ? "too far" : kUnreachable;
-    return member;
-  }
   const std::uint32_t whom = hub.distance == 0 ? 0 : hub.hub_id;
   const auto counters = session.node().hub_counters(kMemberPatience, whom);
   if (!counters) {
@@ -117,33 +104,25 @@ MemberStatus ask_member(ToolSession& session, const NetworkHub& hub) {
   return member;
 }
 
-/// One answer of each hub. Silent hubs cost one patience in all where at most kAskersMax are, and
-/// never more than kAskUntilNs and one patience.
+/// One answer of each hub.
 Outcome<std::vector<MemberStatus>> ask_all(ToolSession& session) {
   const auto hubs = session.node().hubs(kMemberPatience);
   if (!hubs) return hubs.failure();
-  std::vector<MemberStatus> members(hubs->size());
-  std::atomic<std::size_t> next{0};
-  const std::int64_t until_ns = steady_now_ns() + kAskUntilNs;
-  const auto work = [&] {
-    // relaxed: each number is taken once, and the futures hand over what was written.
-    for (std::size_t i = 0; (i = next.fetch_add(1, std::memory_order_relaxed)) < members.size();) {
-      const NetworkHub& hub = (*hubs)[i];
-      members[i] =
-          steady_now_ns() < until_ns
-              ? ask_member(session, hub)
-              : MemberStatus{hub.hub_id, hub.name, {}, {}, "not asked: too many are silent"};
-    }
-  };
-  const SignalsBlocked blocked;
-  std::vector<std::future<void>> askers;
-  for (std::size_t i = 0; i < std::min(kAskersMax, members.size()); ++i)
-    askers.push_back(std::async(std::launch::async, work));
-  for (std::future<void>& asker : askers) asker.get();
+  auto members = ask_each<MemberStatus>(
+      *hubs, [&](const NetworkHub& hub) { return ask_member(session, hub); });
+  for (std::size_t i = 0; i < members.size(); ++i) {
+    members[i].hub_id = (*hubs)[i].hub_id;
+    members[i].name = (*hubs)[i].name;
+  }
   return members;
 }
 
 }  // namespace
+
+std::string why_not_asked(const NetworkHub& hub) {
+  if (hub.too_far) return "too far";
+  return hub.reachable ? "" : std::string(kUnreachable);
+}
 
 ExitCode run_status_of_all(ToolSession& session) {
   auto members = ask_all(session);

@@ -94,7 +94,7 @@ void write(JsonWriter& json, const std::vector<LinkRecord>& links) {
     json.member("queued_bytes", link.queued_bytes).member("sent_bytes", link.sent_bytes);
     json.member("received_bytes", link.received_bytes).member("accepted", link.accepted);
     json.member("delivered", link.delivered).member("dropped", link.dropped);
-    json.member("unsure", link.unsure);
+    json.member("unsure", link.unsure).member("queue_full", link.queue_full);
     if (link.last_error.empty()) {
       json.member("last_error", kUnknown);
     } else {
@@ -112,18 +112,19 @@ std::string json_of(const std::vector<LinkRecord>& links) {
 }
 
 std::string text_of(const std::vector<LinkRecord>& links, Paint paint) {
-  Table table({"NAME", "HUB", "STATE", "COST", "RTT us", "QUEUED", "SENT", "RECEIVED", "PEER",
-               "LAST ERROR"});
+  Table table({"NAME", "HUB", "STATE", "COST", "RTT us", "QUEUED", "SENT", "RECEIVED", "DROPPED",
+               "PEER", "LAST ERROR"});
   for (const LinkRecord& link : links) {
     const bool right = link.state == "up" || link.state == "standby";
     // The other hub chose the name of a link that it dialled, mostly this hub's address.
     const bool from = !link.dialled && link.hub_id != 0;
-    table.add({from ? "from hub " + std::to_string(link.hub_id) : link.name,
-               text_if(link.hub_id != 0, link.hub_id), link.state,
-               text_if(link.cost != 0, link.cost), text_if(link.rtt_us != 0, link.rtt_us),
-               std::to_string(link.queued_bytes), std::to_string(link.sent_bytes),
-               std::to_string(link.received_bytes), link.peer, link.last_error},
-              right ? Tone::plain : Tone::warning);
+    table.add(
+        {from ? "from hub " + std::to_string(link.hub_id) : link.name,
+         text_if(link.hub_id != 0, link.hub_id), link.state, text_if(link.cost != 0, link.cost),
+         text_if(link.rtt_us != 0, link.rtt_us), std::to_string(link.queued_bytes),
+         std::to_string(link.sent_bytes), std::to_string(link.received_bytes),
+         std::to_string(link.dropped), link.peer, link.last_error},
+        right ? Tone::plain : Tone::warning);
   }
   return table.text(paint);
 }

@@ -9,7 +9,7 @@ constexpr std::size_t kSlots = 4;
 
 std::uint64_t total(const SessionCounts& counts) {
   return counts.queued_bytes + counts.accepted + counts.received_bytes + counts.delivered +
-         counts.sent_bytes + counts.dropped;
+         counts.sent_bytes + counts.dropped + counts.queue_full;
 }
 
 TEST(SessionGauges, TellWhatASessionCameTo) {
@@ -21,6 +21,7 @@ TEST(SessionGauges, TellWhatASessionCameTo) {
   counters.delivered.add(3);
   counters.sent_bytes.store(4);
   counters.dropped.add(5);
+  counters.queue_full.add(4);
   gauges.set_queued(ConnectionSlot{kSlots - 1}, 6);
   other.accepted.add(100);
   const SessionCounts counts = gauges.counts(ConnectionSlot{kSlots - 1}, 7);
@@ -29,6 +30,7 @@ TEST(SessionGauges, TellWhatASessionCameTo) {
   EXPECT_EQ(counts.delivered, 3u);
   EXPECT_EQ(counts.sent_bytes, 4u);
   EXPECT_EQ(counts.dropped, 5u);
+  EXPECT_EQ(counts.queue_full, 4u);
   EXPECT_EQ(counts.queued_bytes, 6u);
   EXPECT_EQ(total(gauges.counts(ConnectionSlot{0}, 8)), 100u);
 }

@@ -39,6 +39,7 @@ TEST(FullLane, ItsNodeHearsWhatItCostBeforeWhatComesBehindIt) {
   rig.settle();
   const std::uint64_t lost = rig.counts(reader).dropped;
   EXPECT_GT(lost, 10u);
+  EXPECT_EQ(rig.counts(reader).queue_full, lost);
   EXPECT_THAT(reader.flow_of<proto::flow::Dropped>(),
               ElementsAre(proto::flow::Dropped{DropReason::queue_full, flood.id, lost}));
   EXPECT_EQ(reader.kinds[2], proto::Kind::flow) << "behind the frame that was begun";

@@ -128,6 +128,9 @@ TEST(CtrlNetworkMessages, RecordsFitInTheBytesThatArePlannedForThem) {
   link.name.assign(kNameBytesMax, 'n');
   link.peer.assign(kRemarkBytesMax, 'p');
   link.last_error.assign(kSentenceBytesMax, 'e');
+  link.counts.queue_full = UINT64_MAX;
+  const LinksAnswer one{{link}, false};
+  EXPECT_EQ(*decode_answer<LinksAnswer>(encode_answer(one, 1)), one);
   EXPECT_LE(
       encode_answer(LinksAnswer{{link}, false}, 1).size() - encode_answer(LinksAnswer{}, 1).size(),
       page_bytes_max(link));

@@ -121,11 +121,12 @@ TEST(CtrlMessages, AConnectionMayComeWithoutCounts) {
 
 TEST(CtrlMessages, RecordsFitInTheBytesThatArePlannedForThem) {
   ConnectionRecord record;
-  record.counts.missed = UINT64_MAX;
+  record.counts.missed = record.counts.queue_full = UINT64_MAX;
   record.name.assign(kNameBytesMax, 'n');
   record.transport.assign(kRemarkBytesMax, 't');
   record.peer.assign(kRemarkBytesMax, 'p');
   const ConnectionsAnswer one{{record}, false};
+  EXPECT_EQ(*decode_answer<ConnectionsAnswer>(encode_answer(one, 1)), one);
   EXPECT_LE(encode_answer(one, 1).size() - encode_answer(ConnectionsAnswer{}, 1).size(),
             page_bytes_max(record));
 }

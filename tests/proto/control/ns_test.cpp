@@ -40,6 +40,10 @@ TEST(NsMessages, AreDecodedAndWrittenAsTheVectorsSay) {
   expect_request("ns/withdraw", 5, Withdraw{kGroup});
   expect_answer("ns/withdraw_answer", 5, WithdrawAnswer{});
   expect_request("ns/services", 6, ServicesRequest{});
+  ServicesRequest missed;
+  missed.pattern = "robot/*";
+  missed.missed = true;
+  EXPECT_EQ(*decode<ServicesRequest>(encode(missed, 6)), missed);
   expect_request("ns/subscribe", 7, Subscribe{"robot/odom"});
   SubscribeAnswer answer{state(kNode)};
   answer.instance = 1;

@@ -38,11 +38,11 @@ TEST(RouteGroups, HaveOneToAllPlaces) {
 TEST(RouteGroups, JoinForOneSubscriberEachIfNotSaid) {
   const Join ones{{{kScan, {}}, {kMap, {}}}, false};
   Payload payload = encode(ones);
-  EXPECT_EQ(decode<Join>(payload), ones);
+  EXPECT_EQ(*decode<Join>(payload), ones);
   EXPECT_EQ(payload.size(), kControlHeaderSize + 5 + 24) << "as hubs of 0.9.0 write it";
   Join most;
   most.groups.assign(kGroupsMax, {kScan, {}, UINT32_MAX});
-  EXPECT_EQ(decode<Join>(encode(most)), most);
+  EXPECT_EQ(*decode<Join>(encode(most)), most);
 }
 
 TEST(RouteGroups, HaveOneNumberOfSubscribersForEachGroup) {

@@ -62,7 +62,7 @@ TEST(HubStatus, IsWrittenAsJson) {
   EXPECT_NE(
       json.find(
           R"("connected":true,"queued_bytes":9,"accepted":100,"received_bytes":1200,"delivered":20,)"
-          R"("sent_bytes":320,"dropped":3,"missed":0})"),
+          R"("sent_bytes":320,"dropped":3,"missed":0,"queue_full":0})"),
       std::string::npos)
       << json;
 }
@@ -76,6 +76,25 @@ TEST(HubStatus, IsWrittenForPeople) {
   EXPECT_NE(text.find("7.1  robot"), std::string::npos);
   EXPECT_NE(text.find("connected  100       20         3        0       9"), std::string::npos)
       << text;
+}
+
+TEST(HubStatus, NamesWhoseQueuesWereFull) {
+  HubStatus full = status();
+  full.shards[1].counters.emplace_back("dropped.queue_full", 20);
+  EXPECT_EQ(text_of(full).find(" for "), std::string::npos) << "of an older hub nobody is known";
+  full.connections[0].queue_full = 3;
+  full.links.resize(2);
+  full.links[0].name = "lab";
+  full.links[0].hub_id = 8;
+  full.links[0].queue_full = 16;
+  const std::string text = text_of(full);
+  EXPECT_NE(text.find("  dropped.queue_full: 20\n"
+                      "    for link lab to hub 8: 16\n"
+                      "    for node 7.1 robot: 3\n"
+                      "    for others that have left: 1\n"),
+            std::string::npos)
+      << text;
+  EXPECT_NE(json_of(full).find(R"("links":[{"name":"lab")"), std::string::npos);
 }
 
 }  // namespace

@@ -107,7 +107,7 @@ TEST(NetworkText, OfLinks) {
       "[{\"name\":\"hall\",\"hub\":2,\"peer\":\"tcp://h:1\",\"state\":\"up\",\"dialled\":true,"
       "\"cost\":12,\"rtt_us\":120,\"clock_offset_us\":-1.500,\"clock_error_us\":60.000,"
       "\"queued_bytes\":0,\"sent_bytes\":1,\"received_bytes\":2,\"accepted\":0,\"delivered\":0,"
-      "\"dropped\":0,\"unsure\":0,\"last_error\":null}]\n");
+      "\"dropped\":0,\"unsure\":0,\"queue_full\":0,\"last_error\":null}]\n");
   const LinkRecord dialling{.name = "n", .state = "dialling", .last_error = "nobody listens"};
   EXPECT_THAT(json_of(std::vector{dialling}),
               HasSubstr("\"hub\":null,\"peer\":\"\",\"state\":\"dialling\",\"dialled\":false,"
@@ -115,6 +115,9 @@ TEST(NetworkText, OfLinks) {
   EXPECT_THAT(json_of(std::vector{dialling}), HasSubstr("\"last_error\":\"nobody listens\""));
   EXPECT_THAT(text_of(std::vector{dialling}), HasSubstr("nobody listens"));
   LinkRecord link = some_link();
+  link.dropped = 4'711;
+  EXPECT_THAT(text_of(std::vector{link}), HasSubstr("RECEIVED  DROPPED"));
+  EXPECT_THAT(text_of(std::vector{link}), HasSubstr("  4711  "));
   EXPECT_THAT(text_of(std::vector{link}), HasSubstr("\nhall "));
   link.dialled = false;
   EXPECT_THAT(text_of(std::vector{link}), HasSubstr("\nfrom hub 2 ")) << "its name is the other's";

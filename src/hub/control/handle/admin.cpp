@@ -56,7 +56,8 @@ ctrl::ConnectionCounts counts_of(const SessionCounts& counts) {
           counts.delivered,
           counts.sent_bytes,
           counts.dropped,
-          0};
+          0,
+          counts.queue_full};
 }
 
 ctrl::ConnectionsAnswer connections(const HandlerContext& context,

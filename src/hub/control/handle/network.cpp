@@ -77,7 +77,7 @@ ctrl::LinkRecord record_of(const LinkView& link) {
           .clock_offset_ns = link.clock_offset_ns,
           .clock_error_ns = static_cast<std::uint64_t>(link.clock_error_ns),
           .counts = {link.queued_bytes, link.sent_bytes, link.received_bytes, link.accepted,
-                     link.delivered, link.dropped, link.unsure},
+                     link.delivered, link.dropped, link.unsure, link.queue_full},
           .last_error = link.last_error};
 }
 

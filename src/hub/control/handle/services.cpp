@@ -143,14 +143,18 @@ Result<ns::ServicesAnswer, proto::Refusal> services(const HandlerContext& contex
   NetworkPage<GroupId, ns::ServiceRecord> page(context, wanted.after, wanted.records_max);
   const Topics& own = context.membership.topics();
   const HubTitle title{context.facts.id, context.facts.name};
+  // From afar a hub tells of services of other hubs only what no other hub can tell.
+  const bool others = wanted.missed && context.names != nullptr;
   page.fill(
-      names_for(context, request),
+      others ? context.names->copies() : names_for(context, request),
       [](const NameCopies& names, GroupId after) { return names.group_after(after); },
       [&](const KnownName& known) -> std::optional<ns::ServiceRecord> {
         if (pattern && !pattern->matches(known.name)) return std::nullopt;
         if (is_replaced(context, known)) return std::nullopt;
         ns::ServiceRecord record = service_record_of(known);
-        if (const Topic* topic = own.find(record.name)) {
+        const Topic* topic = own.find(record.name);
+        if (wanted.missed && (topic == nullptr || topic->missed.empty())) return std::nullopt;
+        if (topic != nullptr) {
           record.subscribers = topic->subscriber_count();
           put_missed(record, title.id, *topic);
         }

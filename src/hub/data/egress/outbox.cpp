@@ -206,7 +206,7 @@ void Outbox::drop_replay(proto::DropReason reason, EgressContext& context) {
   for (; !replay.empty(); replay.pop_front()) {
     const Run& run = replay.front();
     if (counted_ != nullptr) counted_->on_run_lost(run);
-    count_dropped(run.frames);
+    count_dropped(run.frames, reason);
     context.tally.queued -= run.frames;
     context.drops.drop_mixed(run.bytes, run.size, reason);
   }
@@ -379,7 +379,7 @@ void Outbox::lose(Entry& entry, proto::DropReason reason, EgressContext& context
   if (entry.frames == 0) return;
   if (entry.fragmented && !entry.complete) lanes_->open_messages.forget(entry);
   if (counted_ != nullptr) counted_->on_entry_lost(entry);
-  count_dropped(entry.frames);
+  count_dropped(entry.frames, reason);
   context.tally.queued -= entry.frames;
   do {
     if (entry.run.frames != 0) context.drops.drop(entry.run.bytes, entry.run.frames, reason);

@@ -123,8 +123,10 @@ class Outbox {
   void set_counters(SessionCounters& counters) { counters_ = &counters; }
   [[nodiscard]] SessionCounters* counters() const { return counters_; }
   /// So many frames that were for this connection are dropped, here or on their way here.
-  void count_dropped(std::uint64_t frames) const {
-    if (counters_ != nullptr) counters_->dropped.add(frames);
+  void count_dropped(std::uint64_t frames, proto::DropReason reason) const {
+    if (counters_ == nullptr) return;
+    counters_->dropped.add(frames);
+    if (reason == proto::DropReason::queue_full) counters_->queue_full.add(frames);
   }
 
   /// The buffer of frames that were written and are not confirmed: they count as this connection's

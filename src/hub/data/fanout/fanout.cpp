@@ -76,7 +76,7 @@ void Fanout::deliver_short_ones(Recipient& recipient, const Run& run,
 void Fanout::lose(const Recipient& recipient, const Run& run, const proto::FrameHeader& header,
                   proto::DropReason reason) {
   recipient.outbox.tell_lost(run, header);
-  recipient.outbox.count_dropped(run.frames);
+  recipient.outbox.count_dropped(run.frames, reason);
   context_.drops.drop(run.bytes, run.frames, reason);
 }
 

@@ -265,13 +265,13 @@ void Pacer::drop_held(PacedSubscription& subscription, DropReason reason) {
 void Pacer::drop(PacedSubscription& subscription, const KeptMessage& message, DropReason reason) {
   uncount(subscription, message);
   message.for_each([&](const Run& run) {
-    subscription.recipient().outbox.count_dropped(run.frames);
+    subscription.recipient().outbox.count_dropped(run.frames, reason);
     context_.drops.drop(run.bytes, run.frames, reason);
   });
 }
 
 void Pacer::drop(PacedSubscription& subscription, const Run& run, DropReason reason) {
-  subscription.recipient().outbox.count_dropped(run.frames);
+  subscription.recipient().outbox.count_dropped(run.frames, reason);
   context_.drops.drop(run.bytes, run.frames, reason);
 }
 
