@@ -7,6 +7,7 @@
 #include <string>
 
 #include "gimnet/gimi.hpp"
+#include "gimnet/gimi/executor.hpp"
 
 int main() try {
   using std::chrono::milliseconds;

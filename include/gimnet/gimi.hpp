@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -11,7 +10,6 @@
 #include "gimnet/gimi.h"
 #include "gimnet/gimi/answers.hpp"
 #include "gimnet/gimi/conversions.hpp"
-#include "gimnet/gimi/executor.hpp"
 #include "gimnet/gimi/handles.hpp"
 #include "gimnet/gimi/hub_access.hpp"
 #include "gimnet/gimi/message.hpp"
@@ -21,6 +19,7 @@
 #include "gimnet/gimi/outcome.hpp"
 #include "gimnet/gimi/records.hpp"
 #include "gimnet/gimi/wait_set.hpp"
+#include "gimnet/gimi/watches.hpp"
 
 // GIMI: how programs use GIMnet, in C++20 over the C functions of gimnet/gimi.h. Only the standard
 // library is needed, and neither exceptions nor RTTI. docs/gimi.md explains it with
@@ -45,13 +44,14 @@
 // be closed, too. Times: all that wait take a Timeout in ms and wait for at most that; kForever has
 // no limit, kNoWait does not wait. Only the end of a handle waits without one, a second at most:
 // Node::close(), and the last Publisher, Subscription or Watch. Callbacks: the library calls none.
-// Received messages wait in queues, which the program empties when it has time; an Executor calls
-// back in the thread that runs it. Texts: a NUL in one becomes U+FFFD, which no name may have.
+// Received messages wait in queues, which the program empties when it has time; an Executor
+// (gimnet/gimi/executor.hpp) calls back in the thread that runs it. Texts: a NUL in one becomes
+// U+FFFD, which no name may have.
 
 namespace gimnet::inline GIMNET_GIMI_NAMESPACE {
 
 /// A member of the network. Leaves for good when it is destroyed.
-class Node : public HubAccess {
+class Node : public HubAccess<void> {
  public:
 #if defined(__cpp_exceptions)
   /// Joins; `name` and `hub` as in NodeOptions. Throws GimnetError.
@@ -102,8 +102,9 @@ class Node : public HubAccess {
 
   /// Tells what becomes of the connection: lost, back, ended, and why. Errors: closed.
   Outcome<ConnectionWatch> watch_connection() const {
-    return detail::made<ConnectionWatch>(
-        [&](gimi_handle* made) { return gimi_watch_connection(handle_, made); });
+    gimi_handle handle = 0;
+    const gimi_status status = gimi_watch_connection(handle_, &handle);
+    return detail::made<ConnectionWatch>(status, handle);
   }
 
   // ---- sending
@@ -112,8 +113,9 @@ class Node : public HubAccess {
   /// earlier Sender of this node to that peer with that key), limit.
   Outcome<Sender> sender(Peer to, const SendOptions& options = {}) const {
     const gimi_send_options how = detail::options_of(options);
-    return detail::made<Sender>(
-        [&](gimi_handle* made) { return gimi_sender(handle_, to.id, &how, made); });
+    gimi_handle handle = 0;
+    const gimi_status status = gimi_sender(handle_, to.id, &how, &handle);
+    return detail::made<Sender>(status, handle);
   }
   /// To who accepts the service of that full name, with its key (SendOptions::key counts for
   /// nothing). Every node of the network may send there; the hub of the service routes it (kind
@@ -123,10 +125,10 @@ class Node : public HubAccess {
   Outcome<Sender> sender(std::string_view service, const SendOptions& options = {},
                          Timeout timeout = Timeout{5000}) const {
     const gimi_send_options how = detail::options_of(options);
-    return detail::made<Sender>([&](gimi_handle* made) {
-      return gimi_sender_to_service(handle_, detail::c_text(service).c_str(), &how,
-                                    milliseconds_of(timeout), made);
-    });
+    gimi_handle handle = 0;
+    const gimi_status status = gimi_sender_to_service(handle_, detail::c_text(service).c_str(),
+                                                      &how, milliseconds_of(timeout), &handle);
+    return detail::made<Sender>(status, handle);
   }
   /// Sends one message; sender() and Sender::send() in one.
   Outcome<void> send(Peer to, BytesView data, const SendOptions& options = {},
@@ -158,14 +160,16 @@ class Node : public HubAccess {
   /// counted.
   Queue queue(MessageKey key, const QueueOptions& options = {}) const {
     const gimi_queue_options how = detail::options_of(options);
-    auto queue = detail::made<Queue>(
-        [&](gimi_handle* made) { return gimi_queue(handle_, detail::key_of(key), &how, made); });
+    gimi_handle handle = 0;
+    const gimi_status status = gimi_queue(handle_, detail::key_of(key), &how, &handle);
+    auto queue = detail::made<Queue>(status, handle);
     return queue ? std::move(*queue) : Queue(queue.failure());
   }
   /// Takes the next message of that key. Errors: timeout, closed.
   Outcome<Message> receive(MessageKey key, Timeout timeout = kForever) const {
-    const auto queue = detail::made<Queue>(
-        [&](gimi_handle* made) { return gimi_queue(handle_, detail::key_of(key), nullptr, made); });
+    gimi_handle handle = 0;
+    const gimi_status status = gimi_queue(handle_, detail::key_of(key), nullptr, &handle);
+    const auto queue = detail::made<Queue>(status, handle);
     if (!queue) return queue.failure();
     return queue->receive(timeout);
   }
@@ -196,9 +200,9 @@ class Node : public HubAccess {
     const std::string metadata = detail::c_text(options.metadata);
     gimi_publish_options how = detail::options_of(options, timeout);
     how.metadata = metadata.c_str();
-    return detail::made<Publisher>([&](gimi_handle* made) {
-      return gimi_advertise(handle_, detail::c_text(name).c_str(), &how, made);
-    });
+    gimi_handle handle = 0;
+    const gimi_status status = gimi_advertise(handle_, detail::c_text(name).c_str(), &how, &handle);
+    return detail::made<Publisher>(status, handle);
   }
   /// Lists the service `own name/name`, to which others send, and gives the queue of what they
   /// send. It ends with the last copy of that. Errors: as advertise().
@@ -207,9 +211,9 @@ class Node : public HubAccess {
     const std::string metadata = detail::c_text(options.metadata);
     gimi_accept_options how = detail::options_of(options, timeout);
     how.metadata = metadata.c_str();
-    return detail::made<Accepted>([&](gimi_handle* made) {
-      return gimi_accept(handle_, detail::c_text(name).c_str(), &how, made);
-    });
+    gimi_handle handle = 0;
+    const gimi_status status = gimi_accept(handle_, detail::c_text(name).c_str(), &how, &handle);
+    return detail::made<Accepted>(status, handle);
   }
   /// Subscribes to a service by its full name; it need not exist yet. Each call makes a queue of
   /// its own. Of several for one name the hub sends what the one wants that wants most, and a
@@ -219,9 +223,10 @@ class Node : public HubAccess {
   Outcome<Subscription> subscribe(std::string_view full_name,
                                   const SubscribeOptions& options = {}) const {
     const gimi_subscribe_options how = detail::options_of(options);
-    return detail::made<Subscription>([&](gimi_handle* made) {
-      return gimi_subscribe(handle_, detail::c_text(full_name).c_str(), &how, made);
-    });
+    gimi_handle handle = 0;
+    const gimi_status status =
+        gimi_subscribe(handle_, detail::c_text(full_name).c_str(), &how, &handle);
+    return detail::made<Subscription>(status, handle);
   }
 
   // ---- requests
@@ -244,18 +249,19 @@ class Node : public HubAccess {
                                       const RequestOptions& options = {}) const {
     const gimi_request_options how = detail::options_of(options, timeout);
     const gimi_bytes bytes{data.data(), data.size()};
-    return detail::made<PendingReply>([&](gimi_handle* made) {
-      return gimi_ask_later(handle_, detail::c_text(service).c_str(), &bytes, &how, made);
-    });
+    gimi_handle handle = 0;
+    const gimi_status status =
+        gimi_ask_later(handle_, detail::c_text(service).c_str(), &bytes, &how, &handle);
+    return detail::made<PendingReply>(status, handle);
   }
   /// Lists the service `own name/name`, which answers requests. Errors: as advertise().
   Outcome<Answers> answer(std::string_view name, Timeout timeout = Timeout{5000}) const {
     gimi_answer_options how{};
     how.struct_size = sizeof how;
     how.timeout_ms = milliseconds_in_options(timeout);
-    return detail::made<Answers>([&](gimi_handle* made) {
-      return gimi_answer(handle_, detail::c_text(name).c_str(), &how, made);
-    });
+    gimi_handle handle = 0;
+    const gimi_status status = gimi_answer(handle_, detail::c_text(name).c_str(), &how, &handle);
+    return detail::made<Answers>(status, handle);
   }
 
   // ---- the own name
@@ -283,10 +289,11 @@ class Node : public HubAccess {
     const std::uint32_t nothing = 1u << 31;  // no subject, which is refused
     std::uint32_t subjects = options.nodes ? GIMI_WATCH_NODES : 0;
     if (options.services) subjects |= GIMI_WATCH_SERVICES;
-    return detail::made<Watch>([&](gimi_handle* made) {
-      return gimi_watch(handle_, detail::c_text(pattern).c_str(),
-                        subjects != 0 ? subjects : nothing, milliseconds_of(timeout), made);
-    });
+    gimi_handle handle = 0;
+    const gimi_status status =
+        gimi_watch(handle_, detail::c_text(pattern).c_str(), subjects != 0 ? subjects : nothing,
+                   milliseconds_of(timeout), &handle);
+    return detail::made<Watch>(status, handle);
   }
 
   /// A node by its name, or by its id as text. Errors: not_found, bad_name, timeout, not_connected.
@@ -300,28 +307,11 @@ class Node : public HubAccess {
   }
   /// The name of a node, "" of one without a name. Errors: not_found, timeout, not_connected.
   Outcome<std::string> name_of(Peer peer, Timeout timeout = Timeout{5000}) const {
-    return detail::text([&](char* name, std::size_t size) {
-      return gimi_name_of(handle_, peer.id, milliseconds_of(timeout), name, size);
-    });
+    detail::Words words;
+    const gimi_status status =
+        gimi_name_of(handle_, peer.id, milliseconds_of(timeout), words.text, sizeof words.text);
+    return detail::text(status, words);
   }
-  /// Nodes whose name matches (`*` one part, `**` any number; "": all, those without a name too),
-  /// ascending ids. Errors of this and the others that list: bad_name (no pattern), timeout,
-  /// not_connected, protocol.
-  Outcome<std::vector<NodeRecord>> nodes(std::string_view pattern = {},
-                                         Timeout timeout = Timeout{5000}) const {
-    return detail::listed<gimi_node_record>([&](gimi_list* list) {
-      return gimi_nodes(handle_, detail::c_text(pattern).c_str(), milliseconds_of(timeout), list);
-    });
-  }
-  /// Services whose full name matches, ascending group ids.
-  Outcome<std::vector<ServiceRecord>> services(std::string_view pattern = {},
-                                               Timeout timeout = Timeout{5000}) const {
-    return detail::listed<gimi_service_record>([&](gimi_list* list) {
-      return gimi_services(handle_, detail::c_text(pattern).c_str(), milliseconds_of(timeout),
-                           list);
-    });
-  }
-
   /// Sends a small message to the library of another node, which answers by itself with `echo` in
   /// it. The round trip in ns, in that lane there and back. Errors: timeout (lost, or late),
   /// not_delivered (no such node, no way to it), denied (a link between hubs may not carry it),
@@ -334,17 +324,6 @@ class Node : public HubAccess {
                                          milliseconds_of(timeout), &round_trip_ns);
     if (status != GIMI_OK) return failure_of(status);
     return round_trip_ns;
-  }
-  /// As ping(), with the way that the answer came.
-  Outcome<TracedPing> trace(Peer to, Timeout timeout = Timeout{1000},
-                            Lane lane = Lane::normal) const {
-    TracedPing traced;
-    gimi_list way{};
-    const gimi_status status = gimi_trace(handle_, to.id, lane_number(lane),
-                                          milliseconds_of(timeout), &traced.round_trip_ns, &way);
-    if (status != GIMI_OK) return failure_of(status);
-    traced.way_back = detail::records_of<gimi_trace_hop_record>(way);
-    return traced;
   }
 
  private:

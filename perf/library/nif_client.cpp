@@ -2,6 +2,7 @@
 // Bursts, requests and what those are compared with are GIMI's, whose messages wait in queues.
 
 #include <atomic>
+#include <memory>
 #include <optional>
 #include <string>
 #include <thread>

@@ -10,6 +10,7 @@ import itertools
 import os
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -120,12 +121,29 @@ class Programs(unittest.TestCase):
 
 
 class Cpp(unittest.TestCase):
+    # Of the standard library: programs say times, texts and lists with them.
+    STANDARD = ("chrono", "optional", "span", "string", "string_view", "vector")
+
+    @staticmethod
+    def compile(program, *options, compiler="g++"):
+        return subprocess.run([compiler, "-std=c++20", *options, f"-I{public_headers.INCLUDE}", "-x", "c++", "-"], input=program,
+                              stdout=subprocess.PIPE, text=True, timeout=TIMEOUT_S, check=True).stdout
+
     def test_compiles_without_exceptions_and_without_rtti(self):
-        program = '#include "gimnet/gimi.hpp"\nint main() { return gimnet::Node::join({.name = "x"}) ? 0 : 1; }\n'
-        for options in (["-fno-exceptions"], ["-fno-rtti"], ["-fno-exceptions", "-fno-rtti"]):
-            with self.subTest(options):
-                subprocess.run(["g++", "-std=c++20", "-fsyntax-only", "-Wall", "-Wextra", "-Werror", *options,
-                                f"-I{public_headers.INCLUDE}", "-x", "c++", "-"], input=program, text=True, timeout=TIMEOUT_S, check=True)
+        program = ('#include "gimnet/gimi/executor.hpp"\n#include "gimnet/gimi.hpp"\n'
+                   'int main() { return gimnet::Node::join({.name = "x"})->nodes() ? 0 : 1; }\n')
+        for compiler in filter(shutil.which, ("g++", "clang++")):
+            for options in ([], ["-fno-exceptions", "-fno-rtti"]):
+                with self.subTest(compiler=compiler, options=options):
+                    self.compile(program, "-fsyntax-only", "-Wall", "-Wextra", "-Wconversion", "-Werror", *options, compiler=compiler)
+
+    def test_the_header_stays_small(self):
+        """Behind the preprocessor: most of the time that a program takes to compile."""
+        standard = self.compile("".join(f"#include <{name}>\n" for name in self.STANDARD), "-E").count("\n")
+        whole = self.compile('#include "gimnet/gimi.hpp"\n', "-E").count("\n")
+        self.assertLess(whole - standard, 5_000)
+        if subprocess.run(["g++", "-dumpversion"], capture_output=True, text=True, timeout=TIMEOUT_S, check=True).stdout.split(".")[0] == "12":
+            self.assertLess(whole, 63_000)
 
 
 if __name__ == "__main__":

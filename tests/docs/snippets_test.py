@@ -37,7 +37,7 @@ GIMI = '#include <iostream>\n#include <vector>\n#include "gimnet/gimi.hpp"\ntemp
 GIMI_C = '#include <stdio.h>\n#include "gimnet/gimi.h"\nvoid show(const void* data, size_t size);\n'
 PAGES = {
     "README.md": Page("c++", GIMI),
-    "docs/gimi.md": Page("c++", "#include <algorithm>\n" + GIMI + "std::string_view position();\nvoid stop();\nvoid forget_all();\nstd::string sum_of(std::string_view numbers);\n",
+    "docs/gimi.md": Page("c++", "#include <algorithm>\n" + GIMI + '#include "gimnet/gimi/executor.hpp"\n' + "std::string_view position();\nvoid stop();\nvoid forget_all();\nstd::string sum_of(std::string_view numbers);\n",
                          "std::vector<std::byte> pixels;\ngimnet::Node calc(\"calc\");\n"),
     "docs/nif.md": Page("c", '#include <stdio.h>\n#include "gimnet/nif.h"\n', "uint32_t peer = 1;\nnif_node* node = NULL;\n"),
     "include/gimnet/gimi.h": Page("c", GIMI_C),
@@ -45,7 +45,7 @@ PAGES = {
     "include/gimnet/gimi_wait.h": Page("c", GIMI_C + "void take(uint64_t user, gimi_message* message);\n",
                                        "gimi_handle pose = 0, orders = 0;\ngimi_message message;\n"),
     "include/gimnet/gimi.hpp": Page("c++", GIMI),
-    "include/gimnet/gimi/executor.hpp": Page("c++", GIMI + "std::string_view position();\n",
+    "include/gimnet/gimi/executor.hpp": Page("c++", GIMI + '#include "gimnet/gimi/executor.hpp"\n' + "std::string_view position();\n",
                                              "gimnet::Node node(\"a\");\nauto pose = node.subscribe(\"b/pose\").or_throw();\n"
                                              "auto odometry = node.advertise(\"odometry\").or_throw();\n"),
     "include/gimnet/nif.h": Page("c", '#include <stdio.h>\n#include "gimnet/nif.h"\nvoid show(const nif_incoming* in);\n',

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -64,13 +63,13 @@ class Answers {
   Outcome<Request> receive(Timeout timeout = kForever) const {
     gimi_request request{};
     const gimi_status status =
-        gimi_next_request(handle_->value(), milliseconds_of(timeout), &request);
+        gimi_next_request(handle_.value(), milliseconds_of(timeout), &request);
     if (status != GIMI_OK) return failure_of(status);
     return Request(request);
   }
 
   /// For the C functions, and for a WaitSet.
-  [[nodiscard]] gimi_handle c_handle() const { return handle_->value(); }
+  [[nodiscard]] gimi_handle c_handle() const { return handle_.value(); }
 
   /// Made by Node.
   explicit Answers(detail::SharedHandle handle) : handle_(std::move(handle)) {}
@@ -100,13 +99,13 @@ class PendingReply {
   [[nodiscard]] std::optional<Reply> wait(Timeout timeout = kForever) const {
     gimi_reply ended{};
     const gimi_status status =
-        gimi_wait_for_reply(handle_->value(), milliseconds_of(timeout), &ended);
+        gimi_wait_for_reply(handle_.value(), milliseconds_of(timeout), &ended);
     if (status == GIMI_TIMEOUT && ended.ended == 0) return std::nullopt;
     return Reply(status, ended);
   }
 
   /// For the C functions, and for a WaitSet.
-  [[nodiscard]] gimi_handle c_handle() const { return handle_->value(); }
+  [[nodiscard]] gimi_handle c_handle() const { return handle_.value(); }
 
   /// Made by Node.
   explicit PendingReply(detail::SharedHandle handle) : handle_(std::move(handle)) {}

@@ -1,9 +1,7 @@
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -15,24 +13,11 @@
 #include "gimnet/gimi/options.hpp"
 #include "gimnet/gimi/outcome.hpp"
 #include "gimnet/gimi/records.hpp"
+#include "gimnet/gimi/shared_handle.hpp"
 
 // From the C structures to those of C++, and back. Part of gimnet/gimi.hpp.
 
 namespace gimnet::inline GIMNET_GIMI_NAMESPACE::detail {
-
-/// Ends a handle. It is shared by the copies of a Publisher and so on.
-class Handle {
- public:
-  explicit Handle(gimi_handle value) : value_(value) {}
-  Handle(const Handle&) = delete;
-  Handle& operator=(const Handle&) = delete;
-  ~Handle() { static_cast<void>(gimi_close(value_)); }
-  [[nodiscard]] gimi_handle value() const { return value_; }
-
- private:
-  const gimi_handle value_;
-};
-using SharedHandle = std::shared_ptr<const Handle>;
 
 [[nodiscard]] inline Outcome<void> outcome_of(gimi_status status) {
   if (status == GIMI_OK) return {};
@@ -100,7 +85,8 @@ using SharedHandle = std::shared_ptr<const Handle>;
   how.struct_size = sizeof how;
   how.key = key_of(options.key);
   how.lane = lane_number(options.lane);
-  how.window = static_cast<std::uint32_t>(std::min<std::size_t>(options.window, UINT32_MAX));
+  how.window =
+      options.window < UINT32_MAX ? static_cast<std::uint32_t>(options.window) : UINT32_MAX;
   how.at_full = static_cast<gimi_at_full_window>(options.at_full);
   how.age_ms_max = options.age_ms_max;
   how.timestamp = options.timestamp ? 1 : 0;
@@ -216,31 +202,27 @@ template <class CRecord>
   return records;
 }
 
-// The answer of `call`, with the handle, the list or the text that it made.
+// The answer of a call, with the handle, the list or the text that it made.
 
-template <class Made, class Call>
-[[nodiscard]] Outcome<Made> made(const Call& call) {
-  gimi_handle handle = 0;
-  const gimi_status status = call(&handle);
+template <class Made>
+[[nodiscard]] Outcome<Made> made(gimi_status status, gimi_handle handle) {
   if (status != GIMI_OK) return failure_of(status);
-  return Made(std::make_shared<const Handle>(handle));
+  return Made(SharedHandle(handle));
 }
 
-template <class CRecord, class Call>
-[[nodiscard]] Outcome<std::vector<decltype(record_of(CRecord{}))>> listed(const Call& call) {
-  gimi_list list{};
-  const gimi_status status = call(&list);
+template <class CRecord>
+[[nodiscard]] Outcome<std::vector<decltype(record_of(CRecord{}))>> listed(gimi_status status,
+                                                                          gimi_list& list) {
   if (status != GIMI_OK) return failure_of(status);
   return records_of<CRecord>(list);
 }
 
-template <class Call>
-[[nodiscard]] Outcome<std::string> text(const Call& call) {
-  std::string words(GIMI_SENTENCE_BYTES_MAX + 1, '\0');
-  const gimi_status status = call(words.data(), words.size());
+struct Words {
+  char text[GIMI_SENTENCE_BYTES_MAX + 1] = "";
+};
+[[nodiscard]] inline Outcome<std::string> text(gimi_status status, const Words& words) {
   if (status != GIMI_OK) return failure_of(status);
-  words.resize(words.find('\0'));
-  return words;
+  return std::string(words.text);
 }
 
 /// The counters of each io thread of the hub.

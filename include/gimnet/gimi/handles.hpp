@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -16,7 +15,7 @@
 #include "gimnet/gimi/outcome.hpp"
 #include "gimnet/gimi/records.hpp"
 
-// Publishers, subscriptions, queues, senders and watches. Part of gimnet/gimi.hpp.
+// Publishers, subscriptions, queues and senders. Part of gimnet/gimi.hpp.
 
 namespace gimnet::inline GIMNET_GIMI_NAMESPACE {
 
@@ -57,40 +56,44 @@ class Queue {
  public:
   /// Takes the oldest. Waits if there is none. Errors: timeout, closed.
   Outcome<Message> receive(Timeout timeout = kForever) const {
-    if (handle_ == nullptr) return failure_;
-    return detail::receive(handle_->value(), timeout);
+    if (!handle_) return failure_;
+    return detail::receive(handle_.value(), timeout);
   }
   /// Takes the oldest; nothing if there is none.
-  [[nodiscard]] std::optional<Message> try_receive() const { return detail::try_receive(number()); }
+  [[nodiscard]] std::optional<Message> try_receive() const {
+    return detail::try_receive(handle_.value());
+  }
   /// Takes the newest and throws the others away, which counts as taking them and not as
   /// overwriting. Nothing if there is none.
   [[nodiscard]] std::optional<Message> take_newest() const {
     gimi_message message{};
-    if (gimi_receive_newest(number(), &message) != GIMI_OK) return std::nullopt;
+    if (gimi_receive_newest(handle_.value(), &message) != GIMI_OK) return std::nullopt;
     return Message(message);
   }
 
   /// Changes the size while it runs; the oldest that no longer fit go and are
   /// counted. 1..kQueueMessagesMax; other numbers count as the nearest of these.
-  void resize(std::size_t messages) const { static_cast<void>(gimi_resize(number(), messages)); }
+  void resize(std::size_t messages) const {
+    static_cast<void>(gimi_resize(handle_.value(), messages));
+  }
   /// Messages that wait now.
-  [[nodiscard]] std::size_t size() const { return detail::counts(number()).waiting; }
+  [[nodiscard]] std::size_t size() const { return detail::counts(handle_.value()).waiting; }
   /// All that ever came.
-  [[nodiscard]] std::uint64_t received() const { return detail::counts(number()).received; }
+  [[nodiscard]] std::uint64_t received() const { return detail::counts(handle_.value()).received; }
   /// Went because it was full.
-  [[nodiscard]] std::uint64_t overwritten() const { return detail::counts(number()).overwritten; }
+  [[nodiscard]] std::uint64_t overwritten() const {
+    return detail::counts(handle_.value()).overwritten;
+  }
 
   /// For the C functions, and for a WaitSet.
-  [[nodiscard]] gimi_handle c_handle() const { return number(); }
+  [[nodiscard]] gimi_handle c_handle() const { return handle_.value(); }
 
   /// Made by Node and Subscription.
   explicit Queue(detail::SharedHandle handle) : handle_(std::move(handle)) {}
   explicit Queue(Failure failure) : failure_(std::move(failure)) {}
 
  private:
-  [[nodiscard]] gimi_handle number() const { return handle_ != nullptr ? handle_->value() : 0; }
-
-  detail::SharedHandle handle_;  ///< null: there is no queue ...
+  detail::SharedHandle handle_;  ///< none: there is no queue ...
   Failure failure_;              ///< ... and why
 };
 
@@ -138,7 +141,7 @@ class Sender {
   /// that nobody has, or that is away), not_connected, refused, not_delivered (also of
   /// SendOptions::end_at_loss: nothing was sent), too_large, closed.
   Outcome<void> send(BytesView data, Timeout timeout = kForever, More more = More::no) const {
-    return detail::outcome_of(gimi_send(handle_->value(), data.data(), data.size(),
+    return detail::outcome_of(gimi_send(handle_.value(), data.data(), data.size(),
                                         milliseconds_of(timeout), more == More::yes ? 1 : 0));
   }
   /// send(), and waits for the acknowledgement of this one message; also without a window. Ok: it
@@ -147,18 +150,18 @@ class Sender {
   /// at a full window, whatever SendOptions::at_full says.
   Outcome<void> send_confirmed(BytesView data, Timeout timeout = kForever) const {
     return detail::outcome_of(
-        gimi_send_confirmed(handle_->value(), data.data(), data.size(), milliseconds_of(timeout)));
+        gimi_send_confirmed(handle_.value(), data.data(), data.size(), milliseconds_of(timeout)));
   }
   /// Waits until nothing is unacknowledged. Ok: all that was sent so far was acknowledged.
   /// Errors: not_delivered (the sentence says how many were lost and why), timeout, closed.
   Outcome<void> settle(Timeout timeout = kForever) const {
-    return detail::outcome_of(gimi_settle(handle_->value(), milliseconds_of(timeout)));
+    return detail::outcome_of(gimi_settle(handle_.value(), milliseconds_of(timeout)));
   }
 
   [[nodiscard]] SendCounts counts() const {
     gimi_send_counts counts{};
     counts.struct_size = sizeof counts;
-    static_cast<void>(gimi_sent(handle_->value(), &counts));
+    static_cast<void>(gimi_sent(handle_.value(), &counts));
     return {counts.sent,
             counts.acknowledged,
             counts.lost,
@@ -168,9 +171,9 @@ class Sender {
             static_cast<LossReason>(counts.loss_reason)};
   }
   /// The node; nobody (id 0) of a stream to a service.
-  [[nodiscard]] Peer peer() const { return Peer{gimi_sends_to(handle_->value())}; }
+  [[nodiscard]] Peer peer() const { return Peer{gimi_sends_to(handle_.value())}; }
   /// The service by its full name; "" of a stream to a node.
-  [[nodiscard]] std::string service() const { return detail::service_name(handle_->value()); }
+  [[nodiscard]] std::string service() const { return detail::service_name(handle_.value()); }
 
   /// Made by Node.
   explicit Sender(detail::SharedHandle handle) : handle_(std::move(handle)) {}
@@ -228,7 +231,7 @@ class Publisher {
   /// as missed), not_retained (sent, but too large to be kept), refused (the hub did not take the
   /// service again), too_large, closed.
   Published publish(BytesView data, Timeout timeout = kPublishTimeout, More more = More::no) const {
-    return detail::outcome_of(gimi_publish(handle_->value(), data.data(), data.size(),
+    return detail::outcome_of(gimi_publish(handle_.value(), data.data(), data.size(),
                                            milliseconds_of(timeout), more == More::yes ? 1 : 0));
   }
   Published publish(BytesView data, More more) const {
@@ -238,51 +241,51 @@ class Publisher {
   /// (over 1 GiB), system (no memory), closed.
   Outcome<Loan> loan(std::size_t size) const {
     gimi_loaned loan{};
-    const gimi_status status = gimi_loan(handle_->value(), size, &loan);
+    const gimi_status status = gimi_loan(handle_.value(), size, &loan);
     if (status != GIMI_OK) return failure_of(status);
     return Loan(loan);
   }
   /// publish() of a loan. One that was sent is empty then; one that was not goes on as it is.
   Published publish(Loan& loan, Timeout timeout = kPublishTimeout, More more = More::no) const {
     return detail::outcome_of(gimi_publish_loan(
-        handle_->value(), &loan.loan_, milliseconds_of(timeout), more == More::yes ? 1 : 0));
+        handle_.value(), &loan.loan_, milliseconds_of(timeout), more == More::yes ? 1 : 0));
   }
   /// Their number, as the hub told last.
-  [[nodiscard]] std::size_t subscribers() const { return gimi_subscribers(handle_->value()); }
+  [[nodiscard]] std::size_t subscribers() const { return gimi_subscribers(handle_.value()); }
   /// Waits until there are that many. Errors: timeout, closed.
   Outcome<void> wait_for_subscribers(std::size_t count, Timeout timeout = kForever) const {
     return detail::outcome_of(
-        gimi_wait_for_subscribers(handle_->value(), count, milliseconds_of(timeout)));
+        gimi_wait_for_subscribers(handle_.value(), count, milliseconds_of(timeout)));
   }
   /// Waits until their number is another one than this told last, and tells it; the first call does
   /// not wait. A camera that nobody watches rests in it. Errors: timeout, closed.
   Outcome<std::size_t> subscribers_changed(Timeout timeout = kForever) const {
     std::size_t count = 0;
     const gimi_status status =
-        gimi_subscribers_changed(handle_->value(), milliseconds_of(timeout), &count);
+        gimi_subscribers_changed(handle_.value(), milliseconds_of(timeout), &count);
     if (status != GIMI_OK) return failure_of(status);
     return count;
   }
   /// In full, as it is now: another one after Node::take_name().
-  [[nodiscard]] std::string name() const { return detail::service_name(handle_->value()); }
+  [[nodiscard]] std::string name() const { return detail::service_name(handle_.value()); }
   /// Messages that publish() sent.
-  [[nodiscard]] std::uint64_t published() const { return gimi_published(handle_->value()); }
+  [[nodiscard]] std::uint64_t published() const { return gimi_published(handle_.value()); }
   /// Messages that publish() dropped, since the hub was away.
-  [[nodiscard]] std::uint64_t unsent() const { return gimi_unsent(handle_->value()); }
+  [[nodiscard]] std::uint64_t unsent() const { return gimi_unsent(handle_.value()); }
   /// Does the hub keep the last message for later subscribers? Ok until it says no, a moment after
   /// publish(). Errors: not_retained (why), closed.
   [[nodiscard]] Outcome<void> retained() const {
-    return detail::outcome_of(gimi_retained(handle_->value()));
+    return detail::outcome_of(gimi_retained(handle_.value()));
   }
   /// Does the hub have the service, or will it be offered with the next connection? Errors: why it
   /// did not take it again after a break or another name, with its words (limit and others; it is
   /// asked again after the next break); closed.
   [[nodiscard]] Outcome<void> standing() const {
-    return detail::outcome_of(gimi_standing(handle_->value()));
+    return detail::outcome_of(gimi_standing(handle_.value()));
   }
 
   /// For the C functions, and for a WaitSet, which waits for what subscribers_changed() tells.
-  [[nodiscard]] gimi_handle c_handle() const { return handle_->value(); }
+  [[nodiscard]] gimi_handle c_handle() const { return handle_.value(); }
 
   /// Made by Node.
   explicit Publisher(detail::SharedHandle handle) : handle_(std::move(handle)) {}
@@ -298,10 +301,10 @@ class Subscription {
   /// As Queue::receive() and Queue::try_receive(). Errors also: silence
   /// (SubscribeOptions::silence).
   Outcome<Message> receive(Timeout timeout = kForever) const {
-    return detail::receive(handle_->value(), timeout);
+    return detail::receive(handle_.value(), timeout);
   }
   [[nodiscard]] std::optional<Message> try_receive() const {
-    return detail::try_receive(handle_->value());
+    return detail::try_receive(handle_.value());
   }
   /// The queue of its messages. The subscription lasts as long as this queue is held.
   [[nodiscard]] Queue queue() const { return Queue(handle_); }
@@ -311,21 +314,21 @@ class Subscription {
   [[nodiscard]] bool accepts() const { return provider() == GIMI_ACCEPTS; }
   /// Waits until there is. Errors: timeout, closed.
   Outcome<void> wait_until_exists(Timeout timeout = kForever) const {
-    return detail::outcome_of(gimi_wait_until_exists(handle_->value(), milliseconds_of(timeout)));
+    return detail::outcome_of(gimi_wait_until_exists(handle_.value(), milliseconds_of(timeout)));
   }
   /// In full.
-  [[nodiscard]] std::string name() const { return detail::service_name(handle_->value()); }
+  [[nodiscard]] std::string name() const { return detail::service_name(handle_.value()); }
   /// Messages that this program does not get: those that did not come, by their sequence, and those
   /// that the queue overwrote. Of Delivery::latest they were skipped for newer ones. One that comes
   /// late, behind at most 63 younger ones, is taken off again.
-  [[nodiscard]] std::uint64_t missed() const { return detail::counts(handle_->value()).missed; }
+  [[nodiscard]] std::uint64_t missed() const { return detail::counts(handle_.value()).missed; }
   /// As Publisher::standing(), of the subscription; with or without a provider.
   [[nodiscard]] Outcome<void> standing() const {
-    return detail::outcome_of(gimi_standing(handle_->value()));
+    return detail::outcome_of(gimi_standing(handle_.value()));
   }
 
   /// For the C functions, and for a WaitSet.
-  [[nodiscard]] gimi_handle c_handle() const { return handle_->value(); }
+  [[nodiscard]] gimi_handle c_handle() const { return handle_.value(); }
 
   /// Made by Node.
   explicit Subscription(detail::SharedHandle handle) : handle_(std::move(handle)) {}
@@ -333,64 +336,9 @@ class Subscription {
  private:
   [[nodiscard]] gimi_direction provider() const {
     gimi_direction provider = GIMI_NOBODY;
-    static_cast<void>(gimi_provider(handle_->value(), &provider));
+    static_cast<void>(gimi_provider(handle_.value(), &provider));
     return provider;
   }
-  detail::SharedHandle handle_;
-};
-
-/// The present and the changes under a pattern of names. Events not taken wait at the hub, which
-/// tells a watch that is too far behind all from the start again. Copies are the same watch;
-/// with the last one it ends, as a Publisher does.
-class Watch {
- public:
-  /// Takes the next event. Waits if there is none. Errors: timeout, closed.
-  Outcome<WatchEvent> receive(Timeout timeout = kForever) const {
-    gimi_watch_event event{};
-    const gimi_status status =
-        gimi_watch_receive(handle_->value(), milliseconds_of(timeout), &event);
-    if (status != GIMI_OK) return failure_of(status);
-    return detail::event_of(event);
-  }
-  /// Takes the next event; nothing if there is none.
-  [[nodiscard]] std::optional<WatchEvent> try_receive() const {
-    gimi_watch_event event{};
-    if (gimi_watch_receive(handle_->value(), 0, &event) != GIMI_OK) return std::nullopt;
-    return detail::event_of(event);
-  }
-
-  /// For the C functions, and for a WaitSet.
-  [[nodiscard]] gimi_handle c_handle() const { return handle_->value(); }
-
-  /// Made by Node.
-  explicit Watch(detail::SharedHandle handle) : handle_(std::move(handle)) {}
-
- private:
-  detail::SharedHandle handle_;
-};
-
-/// The events of the connection of a node, with causes. The first event is the one that was the
-/// last when this was made: it says what is. 64 wait. Copies are the same.
-class ConnectionWatch {
- public:
-  /// Takes the next event. Waits if there is none. Errors: timeout; when all are taken and none
-  /// will come, closed, or why no connection will come.
-  Outcome<ConnectionEvent> receive(Timeout timeout = kForever) const {
-    gimi_connection_event event{};
-    event.struct_size = sizeof event;
-    const gimi_status status =
-        gimi_connection_receive(handle_->value(), milliseconds_of(timeout), &event);
-    if (status != GIMI_OK) return failure_of(status);
-    return ConnectionEvent{static_cast<ConnectionChange>(event.change), event.skipped,
-                           event.when_ns, event.why};
-  }
-  /// For the C functions, and for a WaitSet.
-  [[nodiscard]] gimi_handle c_handle() const { return handle_->value(); }
-
-  /// Made by Node.
-  explicit ConnectionWatch(detail::SharedHandle handle) : handle_(std::move(handle)) {}
-
- private:
   detail::SharedHandle handle_;
 };
 

@@ -11,20 +11,55 @@
 #include "gimnet/gimi/conversions.hpp"
 #include "gimnet/gimi/namespace.hpp"
 
-// Questions to hubs, and changes of them by administrators. Part of gimnet/gimi.hpp.
+// Lists, questions to hubs, and changes of them by administrators. Part of gimnet/gimi.hpp.
 
 namespace gimnet::inline GIMNET_GIMI_NAMESPACE {
 
-/// The part of a Node that speaks with hubs as hubs. Thread safety and errors: as Node's.
+/// The part of a Node that lists what there is, and speaks with hubs as hubs. It is a template so
+/// that a program compiles only those calls that it makes. Thread safety and errors: as Node's.
+template <class Any>
 class HubAccess {
  public:
+  /// Nodes whose name matches (`*` one part, `**` any number; "": all, those without a name too),
+  /// ascending ids. Errors of this and the others that list: bad_name (no pattern), timeout,
+  /// not_connected, protocol.
+  Outcome<std::vector<NodeRecord>> nodes(std::string_view pattern = {},
+                                         Timeout timeout = Timeout{5000}) const {
+    gimi_list list{};
+    const gimi_status status =
+        gimi_nodes(handle_, detail::c_text(pattern).c_str(), milliseconds_of(timeout), &list);
+    return detail::listed<gimi_node_record>(status, list);
+  }
+  /// Services whose full name matches, ascending group ids.
+  Outcome<std::vector<ServiceRecord>> services(std::string_view pattern = {},
+                                               Timeout timeout = Timeout{5000}) const {
+    gimi_list list{};
+    const gimi_status status =
+        gimi_services(handle_, detail::c_text(pattern).c_str(), milliseconds_of(timeout), &list);
+    return detail::listed<gimi_service_record>(status, list);
+  }
+
+  /// As ping(), with the way that the answer came.
+  Outcome<TracedPing> trace(Peer to, Timeout timeout = Timeout{1000},
+                            Lane lane = Lane::normal) const {
+    TracedPing traced;
+    gimi_list way{};
+    const gimi_status status = gimi_trace(handle_, to.id, lane_number(lane),
+                                          milliseconds_of(timeout), &traced.round_trip_ns, &way);
+    if (status != GIMI_OK) return failure_of(status);
+    traced.way_back = detail::records_of<gimi_trace_hop_record>(way);
+    return traced;
+  }
+
+  // ---- hubs
+
   /// The hub itself, the counters of its io threads, its connections (ascending ids), the hubs that
   /// it knows (ascending ids), and its links to others (docs/operations.md). `hub_id` names another
   /// hub of the network; 0 is the own hub. Errors also: not_found (there is no way to that hub).
   Outcome<HubRecord> hub(Timeout timeout = Timeout{5000}, std::uint32_t hub_id = 0) const {
-    auto records = detail::listed<gimi_hub_record>([&](gimi_list* list) {
-      return gimi_hub(handle_, GIMI_HUB, hub_id, milliseconds_of(timeout), list);
-    });
+    gimi_list list{};
+    const gimi_status status = gimi_hub(handle_, GIMI_HUB, hub_id, milliseconds_of(timeout), &list);
+    auto records = detail::listed<gimi_hub_record>(status, list);
     if (!records) return records.failure();
     return std::move(records->front());
   }
@@ -38,29 +73,33 @@ class HubAccess {
   }
   Outcome<std::vector<ConnectionRecord>> hub_connections(Timeout timeout = Timeout{5000},
                                                          std::uint32_t hub_id = 0) const {
-    return detail::listed<gimi_connection_record>([&](gimi_list* list) {
-      return gimi_hub(handle_, GIMI_HUB_CONNECTIONS, hub_id, milliseconds_of(timeout), list);
-    });
+    gimi_list list{};
+    const gimi_status status =
+        gimi_hub(handle_, GIMI_HUB_CONNECTIONS, hub_id, milliseconds_of(timeout), &list);
+    return detail::listed<gimi_connection_record>(status, list);
   }
   Outcome<std::vector<NetworkHub>> hubs(Timeout timeout = Timeout{5000},
                                         std::uint32_t hub_id = 0) const {
-    return detail::listed<gimi_network_hub_record>([&](gimi_list* list) {
-      return gimi_hub(handle_, GIMI_HUB_NETWORK, hub_id, milliseconds_of(timeout), list);
-    });
+    gimi_list list{};
+    const gimi_status status =
+        gimi_hub(handle_, GIMI_HUB_NETWORK, hub_id, milliseconds_of(timeout), &list);
+    return detail::listed<gimi_network_hub_record>(status, list);
   }
   Outcome<std::vector<LinkRecord>> hub_links(Timeout timeout = Timeout{5000},
                                              std::uint32_t hub_id = 0) const {
-    return detail::listed<gimi_link_record>([&](gimi_list* list) {
-      return gimi_hub(handle_, GIMI_HUB_LINKS, hub_id, milliseconds_of(timeout), list);
-    });
+    gimi_list list{};
+    const gimi_status status =
+        gimi_hub(handle_, GIMI_HUB_LINKS, hub_id, milliseconds_of(timeout), &list);
+    return detail::listed<gimi_link_record>(status, list);
   }
   /// The hub's own services, and those of other hubs of which subscribers at this hub missed
   /// messages: ServiceRecord::missed of each is about subscribers at this hub.
   Outcome<std::vector<ServiceRecord>> hub_missed(Timeout timeout = Timeout{5000},
                                                  std::uint32_t hub_id = 0) const {
-    return detail::listed<gimi_service_record>([&](gimi_list* list) {
-      return gimi_hub(handle_, GIMI_HUB_MISSED, hub_id, milliseconds_of(timeout), list);
-    });
+    gimi_list list{};
+    const gimi_status status =
+        gimi_hub(handle_, GIMI_HUB_MISSED, hub_id, milliseconds_of(timeout), &list);
+    return detail::listed<gimi_service_record>(status, list);
   }
 
   // ---- changing the hub, for those who joined as administrators; everybody else is denied
@@ -71,10 +110,10 @@ class HubAccess {
   /// not_found, denied, bad_argument (this node itself, a longer reason).
   Outcome<std::string> kick(Peer node, std::string_view reason = {},
                             Timeout timeout = Timeout{5000}) const {
-    return detail::text([&](char* remark, std::size_t size) {
-      return gimi_kick(handle_, node.id, detail::c_text(reason).c_str(), milliseconds_of(timeout),
-                       remark, size);
-    });
+    detail::Words words;
+    const gimi_status status = gimi_kick(handle_, node.id, detail::c_text(reason).c_str(),
+                                         milliseconds_of(timeout), words.text, sizeof words.text);
+    return detail::text(status, words);
   }
   /// The node goes on under another id of its hub. Errors: not_found, taken, denied, bad_argument,
   /// limit (the hub cannot keep that over a restart: its disk is full).
@@ -89,8 +128,9 @@ class HubAccess {
   /// The hub reads its configuration again. Errors: bad_argument (it is wrong, and nothing was
   /// changed), denied.
   Outcome<std::vector<HubChange>> reload_hub(Timeout timeout = Timeout{5000}) const {
-    return detail::listed<gimi_hub_change_record>(
-        [&](gimi_list* list) { return gimi_reload_hub(handle_, milliseconds_of(timeout), list); });
+    gimi_list list{};
+    const gimi_status status = gimi_reload_hub(handle_, milliseconds_of(timeout), &list);
+    return detail::listed<gimi_hub_change_record>(status, list);
   }
   /// The hub dials one link more, until it ends; an empty name is the URL, cost 0 is measured.
   /// `proxy`: the URL of an HTTP proxy to dial through; the password in it goes to the hub alone.
@@ -116,10 +156,11 @@ class HubAccess {
   /// error, warning, info, debug or off. The level before. Errors: bad_argument, denied.
   Outcome<std::string> set_hub_log_level(std::string_view level,
                                          Timeout timeout = Timeout{5000}) const {
-    return detail::text([&](char* before, std::size_t size) {
-      return gimi_set_hub_log_level(handle_, detail::c_text(level).c_str(),
-                                    milliseconds_of(timeout), before, size);
-    });
+    detail::Words words;
+    const gimi_status status =
+        gimi_set_hub_log_level(handle_, detail::c_text(level).c_str(), milliseconds_of(timeout),
+                               words.text, sizeof words.text);
+    return detail::text(status, words);
   }
 
  protected:

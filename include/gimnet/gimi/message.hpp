@@ -1,6 +1,5 @@
 #pragma once
 
-#include <charconv>
 #include <compare>
 #include <concepts>
 #include <cstddef>
@@ -9,8 +8,6 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <system_error>
-#include <type_traits>
 #include <utility>
 
 #include "gimnet/gimi/namespace.hpp"
@@ -43,11 +40,14 @@ struct Peer {
   static constexpr std::uint32_t kIndexMax = (1u << kIndexBits) - 1;
   [[nodiscard]] static std::optional<std::uint32_t> number(std::string_view text,
                                                            std::uint32_t max) {
-    std::uint32_t value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error != std::errc() || end != text.data() + text.size() || value > max)
-      return std::nullopt;
-    return value;
+    std::uint64_t value = 0;
+    for (const char digit : text) {
+      if (digit < '0' || digit > '9') return std::nullopt;
+      value = value * 10 + static_cast<unsigned>(digit - '0');
+      if (value > max) return std::nullopt;
+    }
+    if (text.empty()) return std::nullopt;
+    return static_cast<std::uint32_t>(value);
   }
 };
 

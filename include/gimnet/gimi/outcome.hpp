@@ -1,15 +1,15 @@
 #pragma once
 
-#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
+#include <new>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <utility>
-#include <variant>
 
 #include "gimnet/gimi/namespace.hpp"
 #include "gimnet/gimi_types.h"
@@ -24,11 +24,11 @@ inline constexpr Timeout kNoWait{0};
 /// A timeout as the C functions take it.
 [[nodiscard]] inline std::int32_t milliseconds_of(Timeout timeout) {
   if (timeout < Timeout{0}) return GIMI_FOREVER;
-  return static_cast<std::int32_t>(std::min<std::int64_t>(timeout.count(), INT32_MAX));
+  return timeout.count() < INT32_MAX ? static_cast<std::int32_t>(timeout.count()) : INT32_MAX;
 }
 /// The same in options, where 0 means the default.
 [[nodiscard]] inline std::int32_t milliseconds_in_options(Timeout timeout) {
-  return std::max(milliseconds_of(timeout), timeout < Timeout{0} ? GIMI_FOREVER : 1);
+  return timeout == Timeout{0} ? 1 : milliseconds_of(timeout);
 }
 
 /// Why a call did not do what it was asked. gimnet/gimi_types.h explains them.
@@ -134,24 +134,42 @@ template <class T>
 class [[nodiscard]] Outcome {
  public:
   // Implicit, so that a function says `return value;` or `return failure;`.
-  Outcome(T value) : state_(std::in_place_index<0>, std::move(value)) {}
-  Outcome(Failure failure) : state_(std::in_place_index<1>, std::move(failure)) {}
+  Outcome(T value) : ok_(true) { ::new (static_cast<void*>(&value_)) T(std::move(value)); }
+  Outcome(Failure failure) : failure_(std::move(failure)) {}
+  Outcome(const Outcome& other)
+    requires std::is_copy_constructible_v<T>
+      : ok_(other.ok_), failure_(other.failure_) {
+    if (ok_) ::new (static_cast<void*>(&value_)) T(other.value_);
+  }
+  Outcome(Outcome&& other) noexcept : ok_(other.ok_), failure_(std::move(other.failure_)) {
+    if (ok_) ::new (static_cast<void*>(&value_)) T(std::move(other.value_));
+  }
+  Outcome& operator=(Outcome other) noexcept {
+    if (ok_) value_.~T();
+    ok_ = other.ok_;
+    failure_ = std::move(other.failure_);
+    if (ok_) ::new (static_cast<void*>(&value_)) T(std::move(other.value_));
+    return *this;
+  }
+  ~Outcome() {
+    if (ok_) value_.~T();
+  }
 
-  [[nodiscard]] bool ok() const { return state_.index() == 0; }
-  [[nodiscard]] explicit operator bool() const { return ok(); }
+  [[nodiscard]] bool ok() const { return ok_; }
+  [[nodiscard]] explicit operator bool() const { return ok_; }
 
   [[nodiscard]] T& value() & {
     check();
-    return *std::get_if<0>(&state_);
+    return value_;
   }
   [[nodiscard]] const T& value() const& {
     check();
-    return *std::get_if<0>(&state_);
+    return value_;
   }
 #if defined(__cpp_exceptions)
   [[nodiscard]] T or_throw() && {
     check();
-    return std::move(*std::get_if<0>(&state_));
+    return std::move(value_);
   }
 #endif
   [[nodiscard]] T& operator*() & { return value(); }
@@ -160,17 +178,19 @@ class [[nodiscard]] Outcome {
   [[nodiscard]] const T* operator->() const { return &value(); }
 
   /// REQUIRES: !ok(). With a value: a Failure without words.
-  [[nodiscard]] Failure failure() const { return ok() ? Failure{} : *std::get_if<1>(&state_); }
-  [[nodiscard]] bool is(Status status) const {
-    return !ok() && std::get_if<1>(&state_)->status == status;
-  }
+  [[nodiscard]] Failure failure() const { return failure_; }
+  [[nodiscard]] bool is(Status status) const { return !ok_ && failure_.status == status; }
 
  private:
   void check() const {
-    if (const auto* failed = std::get_if<1>(&state_)) fail_without_value(*failed);
+    if (!ok_) fail_without_value(failure_);
   }
 
-  std::variant<T, Failure> state_;
+  bool ok_ = false;
+  Failure failure_;  ///< without a value
+  union {
+    T value_;
+  };
 };
 
 /// Done, or a Failure.

@@ -3,7 +3,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <utility>
 #include <vector>
 
@@ -30,7 +29,9 @@ class WaitSet {
 #endif
   /// Errors: limit.
   static Outcome<WaitSet> make() {
-    return detail::made<WaitSet>([](gimi_handle* made) { return gimi_wait_set_create(made); });
+    gimi_handle handle = 0;
+    const gimi_status status = gimi_wait_set_create(&handle);
+    return detail::made<WaitSet>(status, handle);
   }
 
   /// `user` is what wait() tells of it. The set does not hold it. Errors: taken (it is in a set),
@@ -71,7 +72,7 @@ class WaitSet {
     if (status != GIMI_OK) return failure_of(status);
     return descriptor;
   }
-  [[nodiscard]] gimi_handle c_handle() const { return handle_->value(); }
+  [[nodiscard]] gimi_handle c_handle() const { return handle_.value(); }
 
   /// Made by make().
   explicit WaitSet(detail::SharedHandle handle) : handle_(std::move(handle)) {}

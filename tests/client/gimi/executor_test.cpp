@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "gimnet/gimi.hpp"
+#include "gimnet/gimi/executor.hpp"
 #include "tests/client/gimi/support/hub_process.hpp"
 
 // Wait sets and callbacks, as programs use them.

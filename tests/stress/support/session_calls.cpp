@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "gimnet/gimi.hpp"
+#include "gimnet/gimi/executor.hpp"
 #include "tests/stress/support/api_caller.hpp"
 
 // A session of a C++ program: the classes of gimnet/gimi.hpp, and an Executor. Everything in it
