@@ -151,6 +151,33 @@ void draw_hub_figures(Column& column, const Monitor& monitor) {
   column.row("dropped", "", count_text(hub.dropped()), hub.dropped() == 0 ? Ink::kGood : Ink::kBad);
 }
 
+void draw_lab(Column& column, std::string_view title, const std::vector<LabsView::Stream>& lab) {
+  column.heading_over(title, "Hz", "lost");
+  for (const LabsView::Stream& stream : lab) {
+    const Ink ink = stream.lost == 0                ? Ink::kPlain
+                    : stream.lost == stream.excused ? Ink::kWarn
+                                                    : Ink::kBad;
+    column.row(stream.name, fmt::format("{:.1f}", stream.rate_hz), count_text(stream.lost), ink);
+  }
+}
+
+Ink ink_of(LabsView::Wan wan) {
+  switch (wan) {
+    case LabsView::Wan::cut:
+      return Ink::kBad;
+    case LabsView::Wan::back:
+      return Ink::kWarn;
+    case LabsView::Wan::up:
+      break;
+  }
+  return Ink::kGood;
+}
+
+void draw_wan(Column& column, const LabsView& labs) {
+  column.heading("WAN", labs.wan_text, ink_of(labs.wan));
+  column.row("cuts", "", count_text(labs.cuts));
+}
+
 }  // namespace
 
 void draw_panel(Canvas& canvas, const Monitor& monitor, const ScreenState& state,
@@ -163,9 +190,17 @@ void draw_panel(Canvas& canvas, const Monitor& monitor, const ScreenState& state
   };
   draw_robot_figures(column, monitor, state);
   gap();
-  draw_stream_figures(column, monitor, state.now_ns);
-  gap();
-  draw_latency_figures(column, monitor);
+  if (state.labs) {
+    draw_lab(column, "NORTH", state.labs->north);
+    gap();
+    draw_wan(column, *state.labs);
+    gap();
+    draw_lab(column, "SOUTH", state.labs->south);
+  } else {
+    draw_stream_figures(column, monitor, state.now_ns);
+    gap();
+    draw_latency_figures(column, monitor);
+  }
   gap();
   draw_hub_figures(column, monitor);
 }
@@ -187,6 +222,11 @@ void draw_strip(Canvas& canvas, const Monitor& monitor, const ScreenState& state
                           duration_text(monitor.odometry_stream().age.percentile_ns(50)),
                           duration_text(monitor.odometry_stream().age.percentile_ns(99))),
               Ink::kPlain);
+  if (state.labs) {
+    canvas.text({column, row}, fmt::format("WAN {}", state.labs->wan_text),
+                ink_of(state.labs->wan));
+    return;
+  }
   if (!monitor.hub()) return;
   const std::uint64_t dropped = monitor.hub()->dropped();
   canvas.text({column, row},

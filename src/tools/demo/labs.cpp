@@ -10,34 +10,24 @@
 #include <vector>
 
 #include "base/clock.hpp"
-#include "base/endian.hpp"
 #include "gimnet/gimi.hpp"
 #include "impair/fault_proxy.hpp"
 #include "net/address.hpp"
 #include "net/wait.hpp"
+#include "tools/demo/camera.hpp"
+#include "tools/demo/labs_board.hpp"
 #include "tools/demo/own_network.hpp"
 #include "tools/demo/viewer.hpp"
+#include "tools/demo/wan_cuts.hpp"
 
 namespace gimnet::demo {
 namespace {
 
 constexpr std::int64_t kReady_ns = 15'000'000'000;
 constexpr std::int64_t kArrive_ns = 5'000'000'000;
-constexpr std::int64_t kLook_ns = 20'000'000;
-constexpr std::int64_t kWanDelay_ns = 10'000'000;
-constexpr std::int64_t kCutEvery_ns = 10'000'000'000;
+constexpr std::int64_t kWanDelay_ns = 40'000'000;  ///< each way
+constexpr std::int64_t kAskWan_ns = 1'000'000'000;
 constexpr Timeout kAsk{1'000};
-
-/// Asks again until it is so. False: it was not within `wait_ns`.
-bool becomes(std::int64_t wait_ns, const std::function<bool()>& so) {
-  const net::WakeSignal nothing;
-  const std::int64_t until_ns = steady_now_ns() + wait_ns;
-  while (!so()) {
-    if (steady_now_ns() >= until_ns) return false;
-    static_cast<void>(net::wait_for(nullptr, {}, nothing, steady_now_ns() + kLook_ns));
-  }
-  return true;
-}
 
 /// A hub's process, and a node at it that asks about it.
 struct LabHub {
@@ -77,85 +67,11 @@ Result<ChildProcess> start_machine(const LabPaths& paths, const std::string& nam
   return process;
 }
 
-/// Pictures of a camera at one hub, for two viewers at another one. Thread safety: open() first,
-/// then run() on one thread.
-class Camera {
- public:
-  static constexpr std::size_t kBytes = 16 * 1024;
-  static constexpr std::int64_t kPeriod_ns = 50'000'000;
-
-  std::optional<Error> open(const LabHub& here, const LabHub& there) {
-    for (const auto& [hub, name] : {std::pair(&here, "camera"), {&there, ""}, {&there, ""}}) {
-      NodeOptions joining;
-      joining.hub = hub->at.unix_socket;
-      joining.name = name;
-      Outcome<Node> node = Node::join(joining);
-      if (!node) return Error{node.failure().sentence};
-      nodes_.push_back(std::move(*node));
-    }
-    Outcome<Publisher> eye = nodes_[0].advertise("eye");
-    if (!eye) return Error{eye.failure().sentence};
-    eye_.emplace(std::move(*eye));
-    const auto known = [this] {
-      const auto found = nodes_[2].services("camera/eye", kAsk);
-      return found && !found->empty();
-    };
-    if (!becomes(kReady_ns, known)) return Error{"camera/eye is not known at the other hub"};
-    for (std::size_t viewer = 1; viewer < nodes_.size(); ++viewer) {
-      Outcome<Subscription> pictures = nodes_[viewer].subscribe("camera/eye", {.queue = 1'024});
-      if (!pictures) return Error{pictures.failure().sentence};
-      viewers_.push_back({std::move(*pictures), 0});
-    }
-    if (!becomes(kReady_ns, [this] { return eye_->subscribers() > 0; }))
-      return Error{"nobody was heard to subscribe to camera/eye"};
-    return std::nullopt;
-  }
-
-  void run(const std::atomic<bool>& over) {
-    Bytes picture(kBytes);
-    for (std::int64_t due_ns = steady_now_ns(); !over.load(); due_ns += kPeriod_ns) {
-      store_le<std::uint64_t>(picture.data(), sent_ + 1);
-      if (eye_->publish(picture, kAsk)) ++sent_;
-      (void)becomes(due_ns + kPeriod_ns - steady_now_ns(), [&] { return look() || over.load(); });
-    }
-    (void)becomes(kArrive_ns, [this] {
-      (void)look();
-      return std::ranges::all_of(viewers_, [this](const auto& one) { return one.seen == sent_; });
-    });
-  }
-
-  void tell(LabsRecord& record) const {
-    record.pictures = sent_;
-    record.picture_bytes = kBytes;
-    for (const auto& viewer : viewers_) record.seen.push_back(viewer.seen);
-  }
-
- private:
-  /// Takes what has come; false, so that who waits goes on.
-  bool look() {
-    for (auto& viewer : viewers_) {
-      while (const auto message = viewer.pictures.try_receive()) {
-        const bool next = message->data().size() == kBytes &&
-                          load_le<std::uint64_t>(message->data().data()) == viewer.seen + 1;
-        if (next) ++viewer.seen;
-      }
-    }
-    return false;
-  }
-
-  struct Watching {
-    Subscription pictures;
-    std::uint64_t seen;
-  };
-  std::vector<Node> nodes_;
-  std::optional<Publisher> eye_;
-  std::vector<Watching> viewers_;
-  std::uint64_t sent_ = 0;
-};
-
 /// A machine's process, and its driver at a hub.
 struct Driven {
   LabsRecord::Machine machine;
+  LabsBoard::Lab lab;
+  bool crosses_wan;
   ChildProcess process;
   std::unique_ptr<NodePort> port;
   std::unique_ptr<Viewer> viewer;
@@ -167,6 +83,8 @@ struct Wish {
   const char* kind;
   LabHub& at;
   LabHub& from;
+  LabsBoard::Lab lab;
+  bool crosses_wan;
 };
 
 Result<Driven> start_driven(const LabPaths& paths, const Wish& wish) {
@@ -182,6 +100,8 @@ Result<Driven> start_driven(const LabPaths& paths, const Wish& wish) {
   Result<std::unique_ptr<NodePort>> port = connect_viewer({wish.from.at.unix_socket, wish.name});
   if (!port) return port.error();
   return Driven{{wish.name, wish.kind, wish.at.name, wish.from.name, Monitor(0), {}},
+                wish.lab,
+                wish.crosses_wan,
                 std::move(*process),
                 std::move(*port),
                 nullptr};
@@ -214,19 +134,25 @@ class Labs {
 
  private:
   std::optional<Error> start_hubs(const LabPaths& paths);
-  /// Cuts the WAN when that is due; the error of a hub that ended.
+  /// Cuts the WAN, and joins it again, when that is due; the error of a hub that ended.
   std::optional<Error> watch_over();
+  void cut_wan(std::int64_t now_ns);
+  void measure_wan(std::int64_t now_ns);
   void make_viewer(Driven& driven, bool first);
+  [[nodiscard]] StreamRecord::Excuse excuse() {
+    return [this](std::int64_t sent_ns) { return cuts_.explain(sent_ns); };
+  }
 
   const LabsOptions& options_;
   std::optional<TemporaryFolder> folder_;
   std::unique_ptr<impair::FaultProxy> wan_;
   std::vector<LabHub> hubs_;  ///< north, south, the rover's
   std::vector<Driven> driven_;
-  Camera camera_;
+  WanCuts cuts_;
+  LabsBoard board_;
+  Camera camera_{excuse()};
   std::atomic<bool> over_{false};
-  std::int64_t next_cut_ns_ = 0;
-  std::uint64_t cuts_ = 0;
+  std::int64_t next_ask_ns_ = 0;
 };
 
 std::optional<Error> Labs::start_hubs(const LabPaths& paths) {
@@ -258,22 +184,45 @@ std::optional<Error> Labs::start() {
   if (std::optional<Error> error = start_hubs(paths)) return error;
   LabHub& north = hubs_[0];
   LabHub& south = hubs_[1];
-  for (const Wish& wish : {Wish{"rover-1", "driven on site", hubs_[2], north},
-                           Wish{"crawler-1", "driven over the WAN", north, south},
-                           Wish{"simulator", "simulated, same services", south, north}}) {
+  using Lab = LabsBoard::Lab;
+  for (const Wish& wish :
+       {Wish{"rover-1", "driven on site", hubs_[2], north, Lab::north, false},
+        Wish{"crawler-1", "driven over the WAN", north, south, Lab::north, true},
+        Wish{"simulator", "simulated, same services", south, north, Lab::south, true}}) {
     Result<Driven> started = start_driven(paths, wish);
     if (!started) return started.error();
     driven_.push_back(std::move(*started));
   }
-  return camera_.open(hubs_[2], south);
+  return camera_.open({hubs_[2].at.unix_socket, south.at.unix_socket});
+}
+
+void Labs::cut_wan(std::int64_t now_ns) {
+  const WanCuts::Change change = cuts_.step(now_ns);
+  if (change == WanCuts::Change::none) return;
+  const bool cut = change == WanCuts::Change::cut;
+  wan_->refuse(cut);
+  if (cut) wan_->cut();
+  board_.set_round_trip(std::nullopt);
+  if (options_.on_progress) options_.on_progress(cut ? "WAN: CUT" : "WAN: back");
+}
+
+/// The round trip over the WAN, as the link of the south measures it.
+void Labs::measure_wan(std::int64_t now_ns) {
+  if (now_ns < next_ask_ns_) return;
+  next_ask_ns_ = now_ns + kAskWan_ns;
+  const auto links = hubs_[1].node.hub_links(kAsk);
+  if (!links) return;
+  for (const LinkRecord& link : *links) {
+    constexpr std::int64_t kMicrosecond_ns = 1'000;
+    if (link.state == "up" && link.rtt_us != 0)
+      board_.set_round_trip(std::int64_t{link.rtt_us} * kMicrosecond_ns);
+  }
 }
 
 std::optional<Error> Labs::watch_over() {
-  if (steady_now_ns() >= next_cut_ns_ && !over_.load()) {
-    wan_->cut();
-    ++cuts_;
-    next_cut_ns_ += kCutEvery_ns;
-  }
+  const std::int64_t now_ns = wall_now_ns();
+  cut_wan(now_ns);
+  measure_wan(now_ns);
   for (LabHub& hub : hubs_) {
     if (std::optional<Error> error = hub.process.ended()) return error;
   }
@@ -287,9 +236,19 @@ void Labs::make_viewer(Driven& driven, bool first) {
   viewing.autopilot = terminal == nullptr;
   viewing.hub_url = "hub " + driven.machine.driven_from;
   viewing.style = options_.style;
+  if (driven.crosses_wan) viewing.excuse = excuse();
+  const std::size_t place = board_.add(driven.lab, driven.machine.name);
+  viewing.on_look = [this, place](const Monitor& heard, std::int64_t now_ns) {
+    board_.put(place, now_ns, heard.odometry_stream(), &heard.scan_stream());
+  };
   if (first) {
     viewing.trouble = [this](std::int64_t) { return watch_over(); };
     viewing.on_progress = options_.on_progress;
+    viewing.labs = [this](std::int64_t now_ns) {
+      LabsView view = board_.view();
+      cuts_.show(view, now_ns, board_.round_trip_ns());
+      return view;
+    };
   } else {
     viewing.over = [this] { return over_.load(); };
   }
@@ -297,16 +256,25 @@ void Labs::make_viewer(Driven& driven, bool first) {
 }
 
 void Labs::run() {
-  next_cut_ns_ =
-      steady_now_ns() +
-      (options_.seconds ? static_cast<std::int64_t>(*options_.seconds * 5e8) : kCutEvery_ns);
   for (Driven& each : driven_) make_viewer(each, &each == &driven_.front());
+  const std::size_t camera = board_.add(LabsBoard::Lab::south, "camera");
+  cuts_.plan(wall_now_ns(), options_.seconds);
   std::vector<std::thread> threads;
-  threads.emplace_back([this] { camera_.run(over_); });
+  threads.emplace_back([this, camera] {
+    camera_.run(over_, [this, camera](const StreamRecord& heard, std::int64_t now_ns) {
+      board_.put(camera, now_ns, heard);
+    });
+  });
   // The end of each of them stands in its record.
   for (std::size_t i = 1; i < driven_.size(); ++i)
     threads.emplace_back([&viewer = *driven_[i].viewer] { static_cast<void>(viewer.run()); });
   static_cast<void>(driven_[0].viewer->run());
+  // The others are told to end over a WAN that carries.
+  cuts_.stop();
+  (void)becomes(kReady_ns, [this] {
+    cut_wan(wall_now_ns());
+    return cuts_.quiet(wall_now_ns());
+  });
   over_.store(true);
   for (std::thread& thread : threads) thread.join();
 }
@@ -324,7 +292,7 @@ LabsRecord Labs::record() {
   }
   camera_.tell(record);
   record.wan_bytes = wan_->relayed().down_bytes;
-  record.cuts = cuts_;
+  record.cuts = cuts_.count();
   return record;
 }
 

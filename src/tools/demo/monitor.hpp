@@ -2,7 +2,9 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "tools/demo/messages.hpp"
@@ -56,13 +58,21 @@ struct StreamRecord {
   std::uint64_t received = 0;
   /// Numbers that were skipped.
   std::uint64_t missed = 0;
+  /// Of these, those whose loss is as it should be.
+  std::uint64_t excused = 0;
   /// Messages that came twice or out of order.
   std::uint64_t disordered = 0;
   std::uint64_t last_number = 0;
+  std::int64_t last_made_ns = 0;
   /// The sender began before: the first number may be any.
   bool joined_late = false;
 
-  void take(std::uint64_t number, std::int64_t now_ns);
+  /// Is the loss of a message that was made at that time as it should be? Empty: of none.
+  using Excuse = std::function<bool(std::int64_t made_ns)>;
+  void take(const Stamp& stamp, std::int64_t now_ns, const Excuse& excuse = {});
+
+ private:
+  void miss(std::uint64_t count, std::int64_t until_ns, const Excuse& excuse);
 };
 
 /// Everything that the viewer has heard, ready to be shown. Times are ns since 1970. Thread safety:
@@ -76,6 +86,9 @@ class Monitor {
   explicit Monitor(std::int64_t start_ns, bool joined_late = false) : start_ns_(start_ns) {
     odometry_stream_.joined_late = scan_stream_.joined_late = joined_late;
   }
+
+  /// Losses for which it answers true are as they should be.
+  void excuse_by(StreamRecord::Excuse excuse) { excuse_ = std::move(excuse); }
 
   void take(const Odometry& message, std::int64_t now_ns);
   void take(const Scan& message, std::int64_t now_ns);
@@ -110,6 +123,7 @@ class Monitor {
   void extend_trail(const Pose& pose);
 
   std::int64_t start_ns_;
+  StreamRecord::Excuse excuse_;
   std::optional<Odometry> odometry_;
   std::optional<Scan> scan_;
   std::optional<RobotInfo> info_;

@@ -120,7 +120,7 @@ class RobotPort final : public GimiPort {
     return std::nullopt;
   }
 
-  std::optional<Error> command(std::span<const std::byte>) override {
+  Result<bool> command(std::span<const std::byte>) override {
     return Error{"a robot commands nobody"};
   }
 
@@ -152,23 +152,28 @@ class ViewerPort final : public GimiPort {
     return Error{"a viewer publishes nothing"};
   }
 
-  // The robot is there: it was heard before.
-  std::optional<Error> command(std::span<const std::byte> payload) override {
+  // The robot is there: it was heard before. A network that is cut may not find it for a moment.
+  Result<bool> command(std::span<const std::byte> payload) override {
     if (!drive_) {
       SendOptions options;
       options.lane = Lane::real_time;
       Outcome<Sender> sender =
           node().sender(fmt::format("{}/{}", robot_, kDriveName), options, kSend);
-      if (!sender) return Error{sender.failure().sentence};
+      if (!sender) return unsent(sender.failure());
       drive_.emplace(std::move(*sender));
     }
     const Outcome<void> outcome = drive_->send(payload, kSend);
-    return outcome ? std::nullopt : std::optional(Error{outcome.failure().sentence});
+    return outcome ? Result<bool>(true) : unsent(outcome.failure());
   }
 
   [[nodiscard]] bool heard() const override { return false; }
 
  private:
+  static Result<bool> unsent(const Failure& failure) {
+    if (is_final(failure) && failure.status != Status::not_found) return Error{failure.sentence};
+    return false;
+  }
+
   std::string robot_;
   std::vector<Subscription> subscriptions_;
   std::optional<Sender> drive_;

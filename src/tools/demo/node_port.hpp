@@ -69,9 +69,9 @@ class NodePort {
   [[nodiscard]] virtual std::optional<Error> publish(Service service,
                                                      std::span<const std::byte> payload) = 0;
 
-  /// Sends a command to the robot, in the lane that goes first. Errors: the connection ended for
-  /// good.
-  [[nodiscard]] virtual std::optional<Error> command(std::span<const std::byte> payload) = 0;
+  /// Sends a command to the robot, in the lane that goes first. False: it could not be sent at the
+  /// moment. Errors: the connection ended for good.
+  [[nodiscard]] virtual Result<bool> command(std::span<const std::byte> payload) = 0;
 
   /// The next message; nothing if none comes within `wait_ns`. Also the time in which events are
   /// seen to. Errors: the connection ended for good.

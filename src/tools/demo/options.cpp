@@ -21,7 +21,8 @@ constexpr std::string_view kUsage =
                                     the exit code is 0 if nothing was lost, else 1
 
   gimnet-demo --labs                two laboratories with a hub each, a WAN between that is cut now and then,
-                                    a hub inside a robot, three machines, a camera for two viewers
+                                    a hub inside a robot, three machines, a camera for two viewers; the exit code
+                                    is 0 if only what was to cross the WAN in a cut was lost, else 1
 
 Starts a hub of its own, and the robot as a separate process. For your own hub, or two computers:
 

@@ -136,11 +136,10 @@ struct KeyHint {
   std::string_view what;
 };
 constexpr KeyHint kDriveHints[] = {{"W A S D", "drive"}, {"space", "stop"}, {"Q", "quit"},
-                                   {"P", "autopilot"},   {"F", "follow"},   {"+ -", "zoom"},
-                                   {"T", "trail"},       {"?", "help"}};
-constexpr KeyHint kPlayHints[] = {{"space", "hold"}, {"[ ]", "speed"}, {"Q", "quit"},
-                                  {"F", "follow"},   {"+ -", "zoom"},  {"T", "trail"},
-                                  {"?", "help"}};
+                                   {"?", "help"},        {"P", "auto"},     {"F", "follow"},
+                                   {"+ -", "zoom"},      {"T", "trail"}};
+constexpr KeyHint kPlayHints[] = {{"space", "hold"}, {"[ ]", "speed"}, {"Q", "quit"}, {"?", "help"},
+                                  {"F", "follow"},   {"+ -", "zoom"},  {"T", "trail"}};
 
 template <std::size_t size>
 void draw_hints(Canvas& canvas, const KeyHint (&hints)[size]) {

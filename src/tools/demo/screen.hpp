@@ -1,9 +1,11 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "tools/demo/canvas.hpp"
+#include "tools/demo/labs_view.hpp"
 #include "tools/demo/monitor.hpp"
 
 namespace gimnet::demo {
@@ -40,6 +42,8 @@ struct ScreenState {
   bool help = false;
   /// The connection to the hub stands.
   bool connected = true;
+  /// Two laboratories, in place of the figures of the streams.
+  std::optional<LabsView> labs;
 };
 
 /// Smallest screen on which something can be shown.

@@ -23,11 +23,13 @@ struct RunRecord {
   bool own_hub = true;
   /// The reason for which it ended before its time; "" if it did not.
   std::string broken;
+  /// Of the commands, those whose loss is as it should be.
+  std::uint64_t commands_excused = 0;
 };
 
-/// Everything that went wrong, a sentence each; empty: nothing was lost. Messages are counted at
-/// both ends, drops by an own hub; a message `replaced` by a newer one of its stream is not lost.
-/// Thread safety: pure functions.
+/// Everything that went wrong, a sentence each; empty: nothing was lost but what is as it should
+/// be. Messages are counted at both ends, drops by an own hub; a message `replaced` by a newer one
+/// of its stream is not lost. Thread safety: pure functions.
 [[nodiscard]] std::vector<std::string> complaints_about(const Monitor& monitor,
                                                         const RunRecord& run);
 
@@ -53,13 +55,14 @@ struct LabsRecord {
   std::vector<Hub> hubs;
   std::uint64_t pictures = 0;  ///< that the camera sent
   std::uint64_t picture_bytes = 0;
-  std::vector<std::uint64_t> seen;  ///< of them by each viewer, in order and whole
-  std::uint64_t wan_bytes = 0;      ///< that crossed the WAN towards the viewers
-  std::uint64_t cuts = 0;           ///< of the WAN
+  std::vector<StreamRecord> seen;  ///< of them by each viewer, in order and whole
+  std::uint64_t wan_bytes = 0;     ///< that crossed the WAN towards the viewers
+  std::uint64_t cuts = 0;          ///< of the WAN
 };
 
-/// Everything that went wrong, a sentence each; empty: nothing was lost, and the pictures crossed
-/// the WAN once. Thread safety: pure functions.
+/// Everything that went wrong, a sentence each; empty: nothing was lost but what the cuts explain,
+/// and the pictures crossed the WAN once. Cuts explain what was sent in one or soon after it, and
+/// drops of frames that had no way. Thread safety: pure functions.
 [[nodiscard]] std::vector<std::string> complaints_about(const LabsRecord& record);
 
 /// The figures of the run as a table, and the verdict.

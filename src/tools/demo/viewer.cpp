@@ -17,6 +17,9 @@ constexpr std::int64_t kProgressPeriod_ns = 1'000'000'000;
 constexpr double kZoomStep = 1.25;
 constexpr double kZoomMax = 20.0;
 
+/// Messages of a stream of which more need not be waited for.
+std::uint64_t arrived(const StreamRecord& stream) { return stream.received + stream.excused; }
+
 }  // namespace
 
 Viewer::Viewer(NodePort& port, Terminal* terminal, ViewerOptions options)
@@ -25,7 +28,9 @@ Viewer::Viewer(NodePort& port, Terminal* terminal, ViewerOptions options)
       options_(std::move(options)),
       monitor_(port.now_ns(), !options_.own_robot),
       driver_(options_.autopilot),
-      writer_(options_.style) {}
+      writer_(options_.style) {
+  monitor_.excuse_by(options_.excuse);
+}
 
 void Viewer::take(const NodePort::Event& event) {
   const auto heard = [&](const auto& message) {
@@ -79,7 +84,10 @@ void Viewer::take_keys(std::int64_t now_ns) {
 }
 
 ScreenState Viewer::screen_state(std::int64_t now_ns) const {
-  return {map_, options_.hub_url, now_ns, driver_.autopilot(), help_, port_.connected()};
+  ScreenState state{map_,  options_.hub_url,  now_ns, driver_.autopilot(),
+                    help_, port_.connected(), {}};
+  if (options_.labs) state.labs = options_.labs(now_ns);
+  return state;
 }
 
 void Viewer::draw(std::int64_t now_ns) {
@@ -109,15 +117,19 @@ std::optional<Error> Viewer::step(std::int64_t wait_ns) {
   if (!event) return event.error();
   if (*event) take(**event);
   while (const std::optional<DriveCommand> command = driver_.next(monitor_, now_ns)) {
-    if (std::optional<Error> error = port_.command(encode(*command))) return error;
+    const Result<bool> sent = port_.command(encode(*command));
+    if (!sent) return sent.error();
+    if (!*sent) break;
     monitor_.sent(*command, now_ns);
     ++commands_;
+    if (options_.excuse && options_.excuse(now_ns)) ++commands_excused_;
   }
   take_keys(now_ns);
   if (now_ns >= next_counters_ns_) {
     next_counters_ns_ = now_ns + kCountersPeriod_ns;
     if (const std::optional<HubCounters> counters = port_.hub_counters()) monitor_.take(*counters);
   }
+  if (options_.on_look) options_.on_look(monitor_, now_ns);
   draw(now_ns);
   report_progress(now_ns);
   return options_.trouble ? options_.trouble(0) : std::nullopt;
@@ -159,9 +171,10 @@ std::optional<Error> Viewer::watch() {
 
 bool Viewer::everything_arrived() const {
   const std::optional<RobotInfo>& info = monitor_.info();
-  return info && info->ended && info->drive_total == commands_ &&
-         monitor_.odometry_stream().received >= info->odometry_total &&
-         monitor_.scan_stream().received >= info->scan_total;
+  if (!info || !info->ended) return false;
+  const std::uint64_t lost = commands_ - std::min(commands_, info->drive_total);
+  return lost <= commands_excused_ && arrived(monitor_.odometry_stream()) >= info->odometry_total &&
+         arrived(monitor_.scan_stream()) >= info->scan_total;
 }
 
 // Tells an own robot to say no more, waits for what it said before, and then for a hub in which
@@ -189,8 +202,8 @@ RunRecord Viewer::record() const {
   const std::int64_t end_ns = ended_ns_ != 0 ? ended_ns_ : port_.now_ns();
   const double seconds =
       first_heard_ns_ == 0 ? 0.0 : static_cast<double>(end_ns - first_heard_ns_) * 1e-9;
-  return {options_.hub_url,   seconds, commands_, driver_.corners_reached(), finished_,
-          options_.own_robot, broken_};
+  return {options_.hub_url,   seconds, commands_,        driver_.corners_reached(), finished_,
+          options_.own_robot, broken_, commands_excused_};
 }
 
 std::string Viewer::last_picture(Extent extent) const {

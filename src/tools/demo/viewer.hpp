@@ -29,6 +29,12 @@ struct ViewerOptions {
   std::function<bool()> over;
   /// Answers what happened to the other processes, and waits for it at most so long; may be empty.
   std::function<std::optional<Error>(std::int64_t wait_ns)> trouble;
+  /// Losses of messages and commands for which it answers true are as they should be; may be empty.
+  StreamRecord::Excuse excuse;
+  /// Gets what was heard so far, after each look at the network; may be empty.
+  std::function<void(const Monitor&, std::int64_t now_ns)> on_look;
+  /// The laboratories as they are now; empty: there are none.
+  std::function<LabsView(std::int64_t now_ns)> labs;
   /// Takes a line now and then where there is no terminal; may be empty.
   std::function<void(const std::string&)> on_progress;
 };
@@ -89,6 +95,7 @@ class Viewer {
   std::int64_t next_counters_ns_ = 0;
   std::int64_t next_progress_ns_ = 0;
   std::uint64_t commands_ = 0;
+  std::uint64_t commands_excused_ = 0;
 };
 
 }  // namespace gimnet::demo

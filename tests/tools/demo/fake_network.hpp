@@ -21,9 +21,11 @@ class FakeNetwork {
       network_.sent(service, payload, network_.to_viewer);
       return network_.broken;
     }
-    std::optional<Error> command(std::span<const std::byte> payload) override {
+    Result<bool> command(std::span<const std::byte> payload) override {
+      if (network_.broken) return *network_.broken;
+      if (!network_.commands_go) return false;
       network_.sent(Service::kDrive, payload, network_.to_robot);
-      return network_.broken;
+      return true;
     }
     [[nodiscard]] std::int64_t now_ns() const override { return network_.now_ns; }
     Result<std::optional<Event>> receive(std::int64_t wait_ns) override {
@@ -60,6 +62,7 @@ class FakeNetwork {
   std::deque<NodePort::Event> to_viewer;
   std::int64_t now_ns = 1'700'000'000'000'000'000;
   bool heard = true;
+  bool commands_go = true;
   /// Loses each n-th message; 0: none.
   std::uint64_t lose_each = 0;
   std::optional<Error> broken;

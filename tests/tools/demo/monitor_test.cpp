@@ -23,6 +23,18 @@ TEST(Monitor, CountsWhatIsMissing) {
   EXPECT_EQ(monitor.odometry_stream().disordered, 1U);
 }
 
+TEST(Monitor, ExcusesMessagesThatWereMadeWhenTheirLossIsAsItShouldBe) {
+  Monitor monitor(0);
+  monitor.excuse_by([](std::int64_t made_ns) { return made_ns >= 3'000 && made_ns <= 4'000; });
+  for (const std::uint64_t number : {1U, 6U, 9U}) {
+    Odometry message = odometry(number, 0);
+    message.stamp.made_ns = static_cast<std::int64_t>(number) * 1'000;
+    monitor.take(message, 20'000);
+  }
+  EXPECT_EQ(monitor.odometry_stream().missed, 6U);
+  EXPECT_EQ(monitor.odometry_stream().excused, 2U) << "number 3 and number 4";
+}
+
 TEST(Monitor, TheFirstMessageMustBeNumberOne) {
   Monitor monitor(0);
   monitor.take(odometry(4, 0), 2000);

@@ -33,6 +33,30 @@ TEST(Screen, FillsAClassicTerminal) {
   }
 }
 
+TEST(Screen, AllKeysFitAClassicTerminal) {
+  const std::string text = screen(busy_monitor(), state(), {80, 24});
+  EXPECT_THAT(
+      text,
+      HasSubstr("W A S D drive  space stop  Q quit  ? help  P auto  F follow  + - zoom  T trail"));
+  const std::string narrow = screen(busy_monitor(), state(), {50, 24});
+  EXPECT_THAT(narrow, HasSubstr("? help")) << "it is not the first that goes";
+}
+
+TEST(Screen, ShowsBothLaboratoriesAndTheWan) {
+  ScreenState labs = state();
+  labs.labs = {{{"rover-1", 40.0, 0, 0}, {"crawler-1", 0.0, 57, 57}},
+               {{"simulator", 39.5, 3, 3}},
+               LabsView::Wan::cut,
+               "CUT for 0.7 s",
+               2};
+  const std::string text = screen(busy_monitor(), labs, {80, 24});
+  for (const char* part :
+       {"NORTH", "rover-1", "crawler-1    0.0       57", "WAN         CUT for 0.7 s", "SOUTH",
+        "simulator   39.5        3", "ROBOT", "HUB"})
+    EXPECT_THAT(text, HasSubstr(part));
+  EXPECT_THAT(screen(busy_monitor(), labs, {50, 24}), HasSubstr("WAN CUT for 0.7 s"));
+}
+
 TEST(Screen, ANarrowOneHasTheFiguresBelow) {
   const std::string text = screen(busy_monitor(), state(), {40, 14});
   EXPECT_THAT(text, Not(HasSubstr("ROBOT")));

@@ -45,6 +45,31 @@ TEST_F(ViewerTest, DrivesTheCourseAndLosesNothing) {
   EXPECT_TRUE(robot_.finished());
 }
 
+TEST_F(ViewerTest, CountsNoCommandThatCannotBeSentAtTheMoment) {
+  network_.commands_go = false;
+  const std::int64_t until_ns = network_.now_ns + 250'000'000;
+  options_.on_look = [&](const Monitor& heard, std::int64_t now_ns) {
+    EXPECT_GT(now_ns, 0);
+    network_.commands_go = heard.odometry() && now_ns > until_ns;
+  };
+  Viewer viewer(network_.viewer, nullptr, options_);
+  ASSERT_FALSE(viewer.run());
+  EXPECT_THAT(complaints_about(viewer.monitor(), viewer.record()), IsEmpty());
+  EXPECT_TRUE(viewer.record().finished);
+  EXPECT_LT(viewer.record().commands, 9U);
+}
+
+TEST_F(ViewerTest, LossesAreAsTheyShouldBeWhereTheyAreExcused) {
+  network_.lose_each = 11;
+  options_.excuse = [](std::int64_t) { return true; };
+  Viewer viewer(network_.viewer, nullptr, options_);
+  ASSERT_FALSE(viewer.run());
+  EXPECT_GT(viewer.monitor().odometry_stream().excused, 0U);
+  EXPECT_EQ(viewer.record().commands_excused, viewer.record().commands);
+  for (const std::string& complaint : complaints_about(viewer.monitor(), viewer.record()))
+    EXPECT_THAT(complaint, HasSubstr("the hub dropped"));
+}
+
 TEST_F(ViewerTest, SeesThatMessagesWereLost) {
   network_.lose_each = 7;
   Viewer viewer(network_.viewer, nullptr, options_);
