@@ -23,6 +23,10 @@
  * Threads. Every function may be called from any thread at any time, on one handle from many. No
  * function calls back: received things wait in queues until the program takes them.
  *
+ * Signals. No function may be called in a signal handler, nor gimi_close(): the handler notes the
+ * signal, and a thread of the program sees to it. The library never raises SIGPIPE and installs no
+ * handler; interrupted waits go on until their time is up.
+ *
  * Handles. The caller ends each with gimi_close(); a process has at most 2^20. A handle keeps what
  * it needs of its node: one that outlives its node answers GIMI_CLOSED.
  *

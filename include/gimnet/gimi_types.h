@@ -162,7 +162,7 @@ typedef int32_t gimi_connection_change;
 enum {
   GIMI_CONNECTED = 0,       /**< The first connection. */
   GIMI_CONNECTION_LOST = 1, /**< The library dials again. */
-  GIMI_RESUMED = 2,         /**< There is a connection again, and nothing was lost. */
+  GIMI_RESUMED = 2,         /**< There is one again, and the session goes on. */
   GIMI_CONNECTED_ANEW = 3,  /**< There is one again; what was on its way is lost. */
   GIMI_CONNECTION_ENDED = 4 /**< No connection will come any more. */
 };

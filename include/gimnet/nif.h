@@ -25,8 +25,9 @@
  * answered with NIF_FORKED, and nif_close() there releases the descriptor without a word to the
  * hub. Connect anew in the child.
  *
- * Signals. The library never raises SIGPIPE and installs no handler; interrupted waits go on until
- * their time is up.
+ * Signals. No function may be called in a signal handler, nor nif_close(): the handler notes the
+ * signal, and a thread of the program sees to it. The library never raises SIGPIPE and installs no
+ * handler; interrupted waits go on until their time is up.
  *
  * Timeouts are in milliseconds: 0 does not wait, NIF_FOREVER waits without a limit.
  *

@@ -31,7 +31,7 @@ struct NodeState {
 enum class ConnectionChange : std::int32_t {
   connected = 0,       ///< the first connection
   lost = 1,            ///< the library dials again
-  resumed = 2,         ///< there is a connection again, and nothing was lost
+  resumed = 2,         ///< there is one again, and the session goes on
   connected_anew = 3,  ///< there is one again; what was on its way is lost
   ended = 4,           ///< no connection will come any more
 };
