@@ -2,9 +2,11 @@
 """Ctrl-C and SIGTERM end every command of gimnet within 0.2 s, also while the hub stands still: while the command joins, while it
 waits, and while it has much to write."""
 
+import os
 import pathlib
 import re
 import signal
+import statistics
 import subprocess
 import time
 import unittest
@@ -12,9 +14,10 @@ import unittest
 from support.processes import Hub, start_gimnet, start_recv
 from support.waiting import PATIENCE_S, wait_until
 
-WITHIN_S = 0.2
-# The best of them counts, since a machine on which other tests run is late.
-TRIES = 5
+# Beside other tests only a hang shows: ten times the limit. `./dev stress` checks the limit itself, by the median.
+FULL = os.environ.get("GIMNET_STRESS") == "full"
+WITHIN_S = 0.2 if FULL else 2.0
+TRIES = 5 if FULL else 1
 COMMANDS = [["send", "A"], ["recv", "--name", "B"], ["pub", "C/data"], ["echo", "A/x"], ["request", "Q/add", "1", "--timeout", "600"],
             ["answer", "D/add", "--echo"], ["hz", "A/x"], ["bw", "**"], ["ping", "A"], ["trace", "A"], ["watch"], ["nodes"],
             ["services"], ["status"], ["status", "--all"], ["hubs"], ["links"], ["graph"], ["routes", "A"], ["ctl", "connections"],
@@ -45,7 +48,7 @@ class Stopping(unittest.TestCase):
     def assert_ends(self, start, what):
         for number in (signal.SIGINT, signal.SIGTERM):
             times = []
-            while not times or (times[-1] > WITHIN_S and len(times) < TRIES):
+            while len(times) < TRIES:
                 process = start()
                 begun = time.monotonic()
                 process.signal(number)
@@ -53,7 +56,7 @@ class Stopping(unittest.TestCase):
                 times.append(time.monotonic() - begun)
                 self.assertEqual(process.wait(), 128 + number, f"{what}: {process.err}")
                 self.hub.process.signal(signal.SIGCONT)
-            self.assertLess(times[-1], WITHIN_S, f"{what}: {times}")
+            self.assertLess(statistics.median(times), WITHIN_S, f"{what}: {times}")
 
     def test_while_they_join(self):
         def start(arguments):
