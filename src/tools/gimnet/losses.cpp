@@ -80,6 +80,9 @@ std::uint64_t MissedMessages::take(const Message& message) {
   auto& service =
       found != services_.end() ? found->second : services_[std::string(message.service())];
   const auto step = static_cast<std::int32_t>(message.sequence() - service.sequence);
+  const bool same_stream = message.from().id == service.provider && !message.begins_stream();
+  // It was counted as missed. Going back to it would count those behind it once more.
+  if (same_stream && !message.plain() && step <= 0 && step > -kLateMost) return service.missed;
   // The first of a provider says where it stands; a provider that began again counts from 1.
   if (message.begins_stream() || message.plain()) {
     // Nothing is known to be missing.

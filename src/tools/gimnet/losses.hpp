@@ -117,6 +117,9 @@ class MissedMessages {
   /// The longest time between two gaps of one full queue: behind it, frames without a gap were
   /// other messages.
   static constexpr std::int64_t kOneFloodNs = 5'000'000'000;
+  /// A message that is so many numbers behind is of a provider that began again. Nearer ones came
+  /// late, as they do while ways between hubs change (the library knows as many numbers).
+  static constexpr std::int32_t kLateMost = 64;
 
   static void add_sentence(std::vector<std::string>& sentences, Count& count,
                            const std::string& service, std::string_view what);

@@ -182,6 +182,15 @@ TEST_F(MissedMessagesTest, AProviderThatBeginsAgainMissedNothing) {
   EXPECT_EQ(take(2), 0u);
 }
 
+TEST_F(MissedMessagesTest, OneThatComesLateCountsNoneTwice) {
+  take(1);
+  EXPECT_EQ(take(70), 68u);
+  EXPECT_EQ(take(7), 68u);
+  EXPECT_EQ(take(71), 68u) << "goes on behind the highest";
+  EXPECT_EQ(take(7), 68u) << "64 behind: the provider began again";
+  EXPECT_EQ(take(9), 69u);
+}
+
 TEST_F(MissedMessagesTest, NewsComeAtMostOnceASecond) {
   take(1);
   EXPECT_EQ(missed_.news(50), Sentences{});
