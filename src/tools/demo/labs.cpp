@@ -232,7 +232,8 @@ std::optional<Error> Labs::watch_over() {
 void Labs::make_viewer(Driven& driven, bool first) {
   ViewerOptions viewing;
   Terminal* const terminal = first ? options_.terminal : nullptr;
-  viewing.seconds = options_.seconds;
+  // The others end when they are told: what a driver says at its end may not be lost in a cut.
+  if (first) viewing.seconds = options_.seconds;
   viewing.autopilot = terminal == nullptr;
   viewing.hub_url = "hub " + driven.machine.driven_from;
   viewing.style = options_.style;
