@@ -19,7 +19,9 @@ OwnRecord::OwnRecord(HubIdentity identity, HubWords words)
     : identity_(identity), words_(std::move(words)), go_on_pace_([&identity] {
         const auto pause = kGoOnPause + std::chrono::milliseconds(identity.instance.value() >> 56);
         return ChangePace::Pauses{pause, pause};
-      }()) {}
+      }()) {
+  parts_.front().changed = true;
+}
 
 void OwnRecord::set_neighbours(const std::vector<Neighbour>& neighbours) {
   for (Part& part : parts_) {
@@ -54,18 +56,22 @@ void OwnRecord::add(const Neighbour& neighbour) {
 
 void OwnRecord::renumber(HubId hub) {
   identity_.key.hub = hub;
-  for (Part& part : parts_) part.changed = true;
+  say_all_again();
   changed_ = true;
+}
+
+void OwnRecord::say_all_again() {
+  for (Part& part : parts_) part.changed = part.changed || part.sequence != 0;
 }
 
 void OwnRecord::hear(const RecordPart& heard) {
   if (heard.instance == identity_.instance) {
-    // A part that this hub never said was invented: it says that there is nothing in it.
-    if (heard.part >= parts_.size()) {
-      parts_.resize(heard.part + std::size_t{1});
-      changed_ = true;
-    }
-    if (heard.sequence <= parts_[heard.part].sequence) return;
+    if (heard.part >= parts_.size()) parts_.resize(heard.part + std::size_t{1});
+    Part& part = parts_[heard.part];
+    // A part that this hub never said was invented: it says that there is nothing in it. Nobody
+    // heard of those before it.
+    if (part.sequence == 0) part.changed = changed_ = true;
+    if (heard.sequence <= part.sequence) return;
   }
   // The part would hold against what was said, or against what this hub says there next.
   RecordPart mine;
@@ -105,7 +111,7 @@ std::vector<PartRef> OwnRecord::take_due(std::chrono::milliseconds now) {
     pass_.reset();
     if (std::exchange(is_named_, false)) question_ = sequence_ + 1;
     go_on_pace_.note_done(now);
-    for (Part& part : parts_) part.changed = true;
+    say_all_again();
   }
   if (may_change) change_pace_.note_done(now);
   changed_ = false;

@@ -99,10 +99,12 @@ class OwnRecord {
  private:
   struct Part {
     std::vector<proto::route::Neighbour> neighbours;  ///< ascending
-    bool changed = true;
+    bool changed = false;
     std::uint64_t sequence = 0;  ///< as it was sent last; 0: never
   };
   void add(const proto::route::Neighbour& neighbour);
+  /// All parts that others may have. One that was only skipped by a forged number is none.
+  void say_all_again();
   [[nodiscard]] proto::route::RecordPart said(std::uint16_t number) const;
 
   HubIdentity identity_;
