@@ -2,6 +2,8 @@
 """Services that accept data: `gimnet send` sends to one, and whoever wants to read one is told what it is."""
 
 import json
+import signal
+import subprocess
 import unittest
 
 from support.processes import BIN, Hub, Process, run_gimnet, start_gimnet
@@ -15,14 +17,29 @@ READERS = ("echo", "hz", "bw")
 class Sending(unittest.TestCase):
     def setUp(self):
         self.hub = Hub(self)
+        self.robot = self.start_robot()
+        wait_until(lambda: run_gimnet(self.hub, "services", "bot/drive").code == 0, f"bot/drive; it said: {self.robot.err}")
+
+    def start_robot(self):
         robot = Process([str(BIN / "gimnet-demo"), "robot", "--hub", self.hub.url, "--robot", "bot"])
         self.addCleanup(robot.end)
-        wait_until(lambda: run_gimnet(self.hub, "services", "bot/drive").code == 0, f"bot/drive; it said: {robot.err}")
+        return robot
 
     def test_a_service_acknowledges_what_is_sent_to_it(self):
         send = run_gimnet(self.hub, "send", "bot/drive", "--json", data=b"one\ntwo\n")
         self.assertEqual(send.code, 0, send.err)
         self.assertEqual(json.loads(send.out), {"sent": 2, "acknowledged": 2, "lost": 0, "waiting": 0})
+
+    def test_a_service_that_is_away_is_waited_for_in_words(self):
+        for size in (1, 1 << 20):  # in one frame, and in pieces
+            with self.subTest(size=size):
+                self.robot.signal(signal.SIGKILL)
+                wait_until(lambda: any(not node["connected"] for node in self.hub.nodes()), "bot away")
+                send = start_gimnet(self, self.hub, "send", "bot/drive", stdin=subprocess.PIPE).feed(b"x" * size + b"\n")
+                wait_until(lambda send=send: "; waiting for it" in send.err, "the words")
+                self.robot = self.start_robot()
+                self.assertEqual(send.wait(), 0, send.err)
+                self.assertRegex(send.err, r"\Agimnet: bot/drive is away( since \d+ s)?; waiting for it\n\Z")
 
     def test_a_service_that_gives_data_takes_none(self):
         send = run_gimnet(self.hub, "send", "bot/odom", data=b"one\n")

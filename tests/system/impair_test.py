@@ -3,12 +3,15 @@
 
 import json
 import subprocess
+import tempfile
+import time
 import unittest
 
 from support.processes import BIN, Hub, Process, run_gimnet, start_gimnet, start_recv
 from support.waiting import wait_until
 
 USAGE = 2
+SLOW_FILE = 20 << 20  # five seconds at 4 MB/s
 
 
 class Behind(unittest.TestCase):
@@ -49,6 +52,17 @@ class Behind(unittest.TestCase):
         lines = b"".join(b"line %d of two hundred\n" % i for i in range(200))
         self.assertEqual(run_gimnet(url, "send", "B", data=lines).code, 0)
         self.assertEqual((receiver.wait(), receiver.out), (0, lines))
+
+    def test_a_file_on_its_way_is_not_said_to_wait_for_its_acknowledgement(self):
+        start_recv(self, self.hub, "B", "-n", "1", "--max-size", str(SLOW_FILE))
+        url = self.impair("--rate", "4MB")
+        with tempfile.NamedTemporaryFile() as file:
+            file.write(bytes(SLOW_FILE))
+            file.flush()
+            begin = time.monotonic()
+            send = run_gimnet(url, "send", "B", "--file", file.name)
+        self.assertEqual((send.code, send.err), (0, ""))
+        self.assertGreater(time.monotonic() - begin, 4, "longer than `gimnet send` waits without a word")
 
     def test_a_cut_resumes_the_session_and_loses_nothing(self):
         url = self.impair("--delay", "1ms")

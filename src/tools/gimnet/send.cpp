@@ -22,7 +22,7 @@ namespace {
 constexpr std::size_t kWindow = 64;
 /// The largest message that any node can take.
 constexpr std::size_t kMessageBytesMax = std::size_t{1} << 30;
-/// The wait of which nothing is said: for acknowledgements, or for a service that is away.
+/// The wait for acknowledgements of which nothing is said.
 constexpr Timeout kSilentWait{2'000};
 
 /// So that a wrong name is known before anything else is done.
@@ -31,13 +31,40 @@ Outcome<void> check_readable(const std::string& path) {
   return cannot_read(path, errno);
 }
 
-Outcome<void> send_one(const Sender& sender, BytesView message, More more) {
-  auto sent = sender.send(message, kSilentWait, more);
-  if (sent.is(Status::timeout)) {
+/// Two ways to one stream.
+struct TargetSenders {
+  Sender sender;   ///< is told when the service is away
+  Sender patient;  ///< waits for a service that is away
+};
+
+Outcome<TargetSenders> open_target(ToolSession& session, bool is_service, Peer peer) {
+  SendOptions stream;
+  stream.key = session.options().key;
+  stream.lane = session.options().lane;
+  stream.window = kWindow;
+  stream.end_at_loss = true;
+  const auto open = [&] {
+    return is_service ? session.node().sender(session.options().target, stream)
+                      : session.node().sender(peer, stream);
+  };
+  auto sender = open();
+  if (!sender) return sender.failure();
+  stream.wait_if_away = true;
+  auto patient = open();
+  if (!patient) return patient.failure();
+  return TargetSenders{std::move(*sender), std::move(*patient)};
+}
+
+/// A call with less time than kForever would not do: of a message that goes in pieces it leaves the
+/// rest to the library, and answers as if all were sent.
+Outcome<void> send_one(const TargetSenders& target, BytesView message, More more) {
+  auto sent = target.sender.send(message, kForever, more);
+  if (sent.is(Status::not_found)) {
     const std::string& why = sent.failure().sentence;
-    if (why.find(" is away") != std::string::npos)
+    if (why.find(" is away") != std::string::npos) {
       say(why.substr(why.find(": ") + 2) + "; waiting for it");
-    sent = sender.send(message, kForever, more);
+      sent = target.patient.send(message, kForever, more);
+    }
   }
   if (sent || sent.failure().status != Status::too_large || message.size() > kMessageBytesMax)
     return sent;
@@ -55,7 +82,7 @@ Outcome<void> settle(const Sender& sender, const std::string& target) {
   return sender.settle();
 }
 
-Outcome<void> send_file(const Sender& sender, const ToolOptions& options) {
+Outcome<void> send_file(const TargetSenders& target, const ToolOptions& options) {
   const std::string& path = options.file;
   const auto content = FileContent::read(path, kMessageBytesMax);
   if (!content) return content.failure();
@@ -64,8 +91,8 @@ Outcome<void> send_file(const Sender& sender, const ToolOptions& options) {
     return "sending " + path + ", " + byte_count(static_cast<double>(content->bytes().size())) +
            ": " + std::to_string((steady_now_ns() - begin_ns) / 1'000'000'000) + " s";
   });
-  if (auto sent = send_one(sender, content->bytes(), More::no); !sent) return sent;
-  return settle(sender, options.target);
+  if (auto sent = send_one(target, content->bytes(), More::no); !sent) return sent;
+  return settle(target.sender, options.target);
 }
 
 /// The part of the input that was not sent.
@@ -79,7 +106,8 @@ Outcome<void> settle_before(const Sender& sender, Outcome<void> unsent) {
   return settled ? Failure{Status::not_delivered, "messages were lost"} : settled;
 }
 
-Outcome<void> send_lines(ToolSession& session, const Sender& sender, Unsent& unsent) {
+Outcome<void> send_lines(ToolSession& session, const TargetSenders& target, Unsent& unsent) {
+  const Sender& sender = target.sender;
   ConnectionWatch watch(session.node());
   LineInput input(STDIN_FILENO, session.stop().descriptor(),
                   [&] { return watch.goes_on() && sender.counts().lost == 0; });
@@ -93,7 +121,7 @@ Outcome<void> send_lines(ToolSession& session, const Sender& sender, Unsent& uns
   for (;;) {
     switch (input.next(line)) {
       case LineInput::State::line:
-        if (auto sent = send_one(sender, line, input.has_line() ? More::yes : More::no); !sent) {
+        if (auto sent = send_one(target, line, input.has_line() ? More::yes : More::no); !sent) {
           if (sender.counts().lost == 0) unsent = Unsent::line_and_rest;
           return settle_before(sender, std::move(sent));
         }
@@ -179,20 +207,13 @@ ExitCode run_send(ToolSession& session) {
       session.is_service(options.target) && !session.node().find(options.target);
   const auto peer = to_service ? std::optional(Peer{}) : session.find(options.target);
   if (!peer) return session.code();
-  SendOptions stream;
-  stream.key = options.key;
-  stream.lane = options.lane;
-  stream.window = kWindow;
-  stream.end_at_loss = true;
-  stream.wait_if_away = true;
-  const auto sender = to_service ? session.node().sender(options.target, stream)
-                                 : session.node().sender(*peer, stream);
-  if (!sender) return session.fail(sender.failure());
+  const auto target = open_target(session, to_service, *peer);
+  if (!target) return session.fail(target.failure());
   Unsent unsent = Unsent::nothing;
   auto sent =
-      options.file.empty() ? send_lines(session, *sender, unsent) : send_file(*sender, options);
-  if (sent && !session.stopped()) sent = settle(*sender, options.target);
-  const SendCounts counts = sender->counts();
+      options.file.empty() ? send_lines(session, *target, unsent) : send_file(*target, options);
+  if (sent && !session.stopped()) sent = settle(target->sender, options.target);
+  const SendCounts counts = target->sender.counts();
   print(session, counts);
   if (sent) return session.finish();
   session.output().flush();
