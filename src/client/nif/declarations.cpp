@@ -356,6 +356,8 @@ void Declarations::on_subscribed(const std::string& full_name, const proto::Payl
     // A hub that began anew may give another program the same group.
     bool changed = former != now.group;
     changed |= known.take_provider(now);
+    // An event may have overtaken the answer from which `away` was known.
+    changed |= now.direction == proto::ns::Direction::accepts;
     // Also that the hub takes it again: a program that was told of the refusal has to know.
     changed |= std::exchange(known.refused, !answer) == answer.has_value();
     // Requests of the program in between may never have left.

@@ -3,9 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <map>
+#include <optional>
 #include <string>
 #include <thread>
 
+#include "client/nif/handles.hpp"
+#include "client/nif/node.hpp"
 #include "gimnet/nif_names.h"
 #include "tests/client/nif/support/declaring.hpp"
 
@@ -265,6 +268,43 @@ TEST(Declarations, UnsubscribeNothingBehindASubscriptionThatBeginsAnew) {
   }
   asking.join();
   EXPECT_TRUE(anew);
+}
+
+/// The library's thread takes the event before the asking thread enters what the hub answered.
+TEST(Declarations, TellWhereAServiceThatAcceptsIsThoughAnEventOvertookItsAnswer) {
+  FakeHub hub;
+  Connected connected = connect_to(hub, default_options("robot"), make_welcome(kResumeBytes));
+  nif_node* const node = connected.node.get();
+  Node* const shared = share_node(node);
+  Declarations& declarations = shared->declarations();
+  proto::ns::SubscribeAnswer answer;
+  answer.group = GroupId{kGroup};
+  answer.provider = NodeId{kPeerId};
+  answer.direction = proto::ns::Direction::accepts;
+  proto::ns::ServiceMoved away{answer, "peer/drive"};
+  away.away = true;
+  // Nothing: a message came, and no event before it.
+  const auto next_move = [node]() -> std::optional<std::uint8_t> {
+    for (nif_incoming in; nif_receive(node, &in, NIF_FOREVER) == NIF_OK;) {
+      const nif_incoming taken = in;
+      nif_release(&in);
+      if (taken.type == NIF_SERVICE_MOVED) return taken.flags;
+      if (taken.type == NIF_MESSAGE) break;
+    }
+    return std::nullopt;
+  };
+  proto::ns::Subscribe request{"peer/drive"};
+  EXPECT_FALSE(declarations.begin_subscription(request));
+  connected.hub.send_control(proto::Kind::ns, proto::encode(away));
+  EXPECT_EQ(next_move(), std::uint8_t{NIF_SERVICE_AWAY});
+  declarations.add_subscription(request, answer);
+  come_back(hub, connected, true);
+  std::uint16_t number = 0;
+  ASSERT_TRUE(connected.hub.next_request<proto::ns::Subscribe>(number));
+  connected.hub.send_control(proto::Kind::ns, proto::encode_answer(answer, number));
+  connected.hub.send_unicast(kPeerId, kOwnId, "settled");
+  EXPECT_EQ(next_move(), std::uint8_t{0}) << "it is there";
+  shared->drop();
 }
 
 /// From kPeerId, in a frame of so many bytes.
