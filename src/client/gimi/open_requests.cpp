@@ -265,11 +265,13 @@ bool OpenRequests::on_reply(const proto::gimi::MessageHeader& header, Message& r
   return true;
 }
 
-void OpenRequests::on_error(const proto::gimi::MessageHeader& header, Peer from,
+bool OpenRequests::on_error(const proto::gimi::MessageHeader& header, Peer from,
                             const proto::gimi::RequestError& error) {
   const MutexLock lock(mutex_);
   Open* const open = find(header, from);
-  if (open != nullptr) finish(*open, reply_of(error, open->service, open->unsure));
+  if (open == nullptr) return false;
+  finish(*open, reply_of(error, open->service, open->unsure));
+  return true;
 }
 
 void OpenRequests::on_report(std::uint32_t sequence, std::uint32_t reason,

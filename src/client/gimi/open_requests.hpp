@@ -79,8 +79,9 @@ class OpenRequests {
   /// True: it took the message, with its storage. `reply` is empty if it is too large.
   [[nodiscard]] bool on_reply(const proto::gimi::MessageHeader& header, Message& reply,
                               bool too_large) GIMNET_EXCLUDES(mutex_);
-  void on_error(const proto::gimi::MessageHeader& header, Peer from,
-                const proto::gimi::RequestError& error) GIMNET_EXCLUDES(mutex_);
+  /// False: no request that this node was asked waits for it.
+  [[nodiscard]] bool on_error(const proto::gimi::MessageHeader& header, Peer from,
+                              const proto::gimi::RequestError& error) GIMNET_EXCLUDES(mutex_);
   /// The hub could not deliver it.
   void on_report(std::uint32_t sequence, std::uint32_t reason, const std::string& words)
       GIMNET_EXCLUDES(mutex_);

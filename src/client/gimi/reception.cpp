@@ -326,8 +326,9 @@ void Reception::on_error(const nif_incoming& in, const proto::gimi::MessageView&
     const auto error = proto::gimi::decode_request_error(view.data);
     if (!error) return losses_.add_unreadable();
     const std::string sentence = plain_words(error->sentence);
-    requests_.on_error(view.header, Peer{in.from}, {error->fault, error->code, sentence});
-    if (error->fault == proto::gimi::RequestFault::too_large) uplink_.give_up(view.header);
+    const bool known =
+        requests_.on_error(view.header, Peer{in.from}, {error->fault, error->code, sentence});
+    if (known && error->fault == proto::gimi::RequestFault::too_large) uplink_.give_up(view.header);
     return;
   }
   const auto failure = proto::gimi::decode_error(view.data);
