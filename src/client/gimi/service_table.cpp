@@ -373,14 +373,18 @@ void ServiceTable::on_reconnected() {
 }
 
 void ServiceTable::tell_missed() {
-  const MutexLock lock(mutex_);
-  for (auto& [name, service] : subscribed_) {
-    if (const auto news = service->news_of_missed(); !news.empty())
-      log_info(uplink_.node_name(), news);
-    const std::uint64_t total = service->missed_in_all();
-    if (total == service->missed_told || service->place.group == 0) continue;
-    if (uplink_.tell_missed(service->place.group, total)) service->missed_told = total;
+  std::vector<std::string> news;  // written without the lock: standard error may be a full pipe
+  {
+    const MutexLock lock(mutex_);
+    for (auto& [name, service] : subscribed_) {
+      if (std::string words = service->news_of_missed(); !words.empty())
+        news.push_back(std::move(words));
+      const std::uint64_t total = service->missed_in_all();
+      if (total == service->missed_told || service->place.group == 0) continue;
+      if (uplink_.tell_missed(service->place.group, total)) service->missed_told = total;
+    }
   }
+  for (const std::string& words : news) log_info(uplink_.node_name(), words);
 }
 
 void ServiceTable::end(const Ending& ending) {
