@@ -179,6 +179,11 @@ GIMNET_API gimi_status gimi_sender(gimi_handle node, gimi_peer to, const gimi_se
  * GIMI_TOO_LARGE. */
 GIMNET_API gimi_status gimi_send(gimi_handle sender, const void* data, size_t size,
                                  int32_t timeout_ms, int32_t more);
+/** gimi_send() by a caller that makes the call again after GIMI_TIMEOUT: this does not count among
+ * the messages that were not sent while the hub was away (gimi_connection_event.why). gimi_send()
+ * with a timeout of 0 does not either. */
+GIMNET_API gimi_status gimi_try_send(gimi_handle sender, const void* data, size_t size,
+                                     int32_t timeout_ms, int32_t more);
 /** gimi_send(), and waits for the acknowledgement of this one message, which has its place among
  * all others of its stream; also without a window. GIMI_OK: it is in the queue of its receiver.
  * GIMI_NOT_DELIVERED (why it is not, or may not be). GIMI_TIMEOUT: the sentence says whether it was

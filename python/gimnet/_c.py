@@ -206,6 +206,7 @@ _STATUS_FUNCTIONS = {
     "gimi_sender_to_service": [_HANDLE, c_char_p, POINTER(gimi_send_options), c_int32, _HANDLE_OUT],
     "gimi_sender": [_HANDLE, c_uint32, POINTER(gimi_send_options), _HANDLE_OUT],
     "gimi_send": [_HANDLE, c_void_p, c_size_t, c_int32, c_int32],
+    "gimi_try_send": [_HANDLE, c_void_p, c_size_t, c_int32, c_int32],
     "gimi_send_confirmed": [_HANDLE, c_void_p, c_size_t, c_int32],
     "gimi_receive": [_HANDLE, c_int32, POINTER(gimi_message)],
     "gimi_receive_packed": [_HANDLE, c_uint32, c_int32, POINTER(gimi_batch)],

@@ -54,19 +54,19 @@ def left_ms(end: float, most: int) -> int:
     return most if left * 1000 >= most else max(0, math.ceil(left * 1000))
 
 
-def in_pieces(timeout: Optional[float], call: Callable[[int], Any]) -> int:
-    """Calls with milliseconds until the status is not GIMI_TIMEOUT, or the seconds are over; None: no limit."""
+def in_pieces(timeout: Optional[float], call: Callable[[int], Any], last: Optional[Callable[[int], Any]] = None) -> int:
+    """Calls with milliseconds until the status is not GIMI_TIMEOUT, or the seconds are over; None: no limit.
+    `last`: the call with the rest of the time, after which nobody tries again."""
     check_time(timeout)
     status = int(call(0))
-    if status != _c.GIMI_TIMEOUT:
+    if status != _c.GIMI_TIMEOUT or timeout == 0:
         return status
     end = end_of(timeout)
-    while status == _c.GIMI_TIMEOUT:
-        left = left_ms(end, PIECE_MS)
-        if left <= 0:
-            break
-        status = int(call(left))
-    return status
+    while left_ms(end, 2 * PIECE_MS) == 2 * PIECE_MS:
+        status = int(call(PIECE_MS))
+        if status != _c.GIMI_TIMEOUT:
+            return status
+    return int((last or call)(max(1, left_ms(end, 2 * PIECE_MS))))
 
 
 def to_text(text: str) -> bytes:

@@ -88,8 +88,8 @@ class Watch(Stream[Event]):
 class ConnectionEvent:
     """What became of the connection of a node: `change` is connected, lost, resumed (the session goes on),
     connected anew (what was on its way is lost) or ended (none will come any more). `why` is the cause in
-    words, with the number of messages that were not sent meanwhile. `when` is in seconds since 1970. `skipped`
-    events before it went, since 64 waited."""
+    words, with the number of messages that were not sent meanwhile, apart from those of send() with a timeout
+    of 0. `when` is in seconds since 1970. `skipped` events before it went, since 64 waited."""
 
     change: str
     why: str
@@ -284,8 +284,8 @@ class Node(Waitable):
         sender = self._sender(to, lane, wait_if_away, timeout)
         data, size, keeps = messages.payload(value)
         if not confirm and size <= _PIECES_BYTES_MAX:
-            status = in_pieces(timeout, lambda ms: _c.lib.gimi_send(sender, data, size, ms, 0))
-            del keeps
+            status = in_pieces(timeout, lambda ms: _c.lib.gimi_try_send(sender, data, size, ms, 0),
+                               lambda ms: _c.lib.gimi_send(sender, data, size, ms, 0))
             return self.check(status)
         ms = to_ms(timeout) if confirm else left_ms(end_of(timeout), TIMEOUT_MS_MAX)
 

@@ -158,6 +158,16 @@ gimi_status gimi_send(gimi_handle sender, const void* data, size_t size, int32_t
   });
 }
 
+gimi_status gimi_try_send(gimi_handle sender, const void* data, size_t size, int32_t timeout_ms,
+                          int32_t more) {
+  if (data == nullptr && size != 0) return is_null("gimi_try_send(): data");
+  return with<SenderObject>(sender, [&](SenderObject& found) {
+    return answer(found.stream->send(bytes_of(data, size), timeout_of(timeout_ms),
+                                     more != 0 ? More::yes : More::no, found.at_away,
+                                     AtTimeout::try_again));
+  });
+}
+
 gimi_status gimi_send_confirmed(gimi_handle sender, const void* data, size_t size,
                                 int32_t timeout_ms) {
   if (data == nullptr && size != 0) return is_null("gimi_send_confirmed(): data");

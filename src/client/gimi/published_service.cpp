@@ -50,7 +50,7 @@ Outcome<void> PublishedService::publish(BytesView data, Timeout timeout, More mo
   } else if (!sent) {
     failure = failure_of(status, "publish " + full_name());
   }
-  if (!sent) uplink_.note_unsent(status);
+  if (!sent) uplink_.note_unsent(status, AtTimeout::give_up);
   const MutexLock lock(mutex_);
   sending_ = false;
   changed_.notify_all();

@@ -19,14 +19,20 @@ Loss withdrawn() { return {LossReason::service_gone, "the service was withdrawn"
 
 }  // namespace
 
-Outcome<void> SendStream::send(BytesView data, Timeout timeout, More more, AtAway at_away) {
-  return send(data, {.deadline_ns = deadline_after(timeout), .more = more, .at_away = at_away});
+Outcome<void> SendStream::send(BytesView data, Timeout timeout, More more, AtAway at_away,
+                               AtTimeout at_timeout) {
+  return send(data, {.deadline_ns = deadline_after(timeout),
+                     .more = more,
+                     .at_away = at_away,
+                     .at_timeout = timeout == kNoWait ? AtTimeout::try_again : at_timeout});
 }
 
 Outcome<void> SendStream::send_confirmed(BytesView data, Timeout timeout, AtAway at_away) {
   Confirmation confirmation;
-  const Order order{
-      .deadline_ns = deadline_after(timeout), .at_away = at_away, .confirmation = &confirmation};
+  const Order order{.deadline_ns = deadline_after(timeout),
+                    .at_away = at_away,
+                    .at_timeout = timeout == kNoWait ? AtTimeout::try_again : AtTimeout::give_up,
+                    .confirmation = &confirmation};
   auto fate = send(data, order);
   const MutexLock lock(mutex_);
   if (fate) fate = await(confirmation, order.deadline_ns);
@@ -77,7 +83,7 @@ Outcome<void> SendStream::send(BytesView data, const Order& order) {
   }
   if (unwatched) watch_if_needed();
   if (status == NIF_OK) return {};
-  uplink_.note_unsent(status);
+  uplink_.note_unsent(status, order.at_timeout);
   return failure;
 }
 
@@ -123,7 +129,7 @@ Outcome<SendStream::Turn> SendStream::take_turn(BytesView data, const Order& ord
     // Nobody acknowledges what was not written.
     if (std::exchange(unflushed_, false)) static_cast<void>(nif_flush(uplink_.node()));
     if (is_over(order.deadline_ns)) {
-      uplink_.note_unsent(NIF_TIMEOUT);
+      uplink_.note_unsent(NIF_TIMEOUT, order.at_timeout);
       return Failure{Status::timeout,
                      "not sent to " + target() +
                          ": earlier messages were not acknowledged within the time given"};

@@ -66,8 +66,11 @@ class SendStream {
         destination_{NIF_SERVICE, place.destination(), place.key, Uplink::draw_epoch()},
         window_(window_of(options)) {}
 
+  /// Without any time (kNoWait) it is a try: the program may try again.
   [[nodiscard]] Outcome<void> send(BytesView data, Timeout timeout, More more,
-                                   AtAway at_away = AtAway::refuse) GIMNET_EXCLUDES(mutex_);
+                                   AtAway at_away = AtAway::refuse,
+                                   AtTimeout at_timeout = AtTimeout::give_up)
+      GIMNET_EXCLUDES(mutex_);
   /// send(), and waits for what becomes of this one message; also of a stream without a window.
   [[nodiscard]] Outcome<void> send_confirmed(BytesView data, Timeout timeout,
                                              AtAway at_away = AtAway::refuse)
@@ -127,6 +130,7 @@ class SendStream {
     std::int64_t deadline_ns = 0;
     More more = More::no;
     AtAway at_away = AtAway::refuse;
+    AtTimeout at_timeout = AtTimeout::give_up;
     Confirmation* confirmation = nullptr;  ///< null: nobody waits for the fate of this message
   };
   /// A message between its sequence and NIF.

@@ -178,11 +178,12 @@ std::string Uplink::node_name() const {
   return *info.name != '\0' ? info.name : Peer{info.id}.text();
 }
 
-void Uplink::note_unsent(nif_status why) const {
+void Uplink::note_unsent(nif_status why, AtTimeout at_timeout) const {
   nif::Node* const direct = direct_.load();
   if (direct == nullptr) return;
   const bool away =
-      why == NIF_NOT_CONNECTED || (why == NIF_TIMEOUT && direct->info().connected == 0);
+      why == NIF_NOT_CONNECTED ||
+      (why == NIF_TIMEOUT && at_timeout == AtTimeout::give_up && direct->info().connected == 0);
   if (away) unsent_.fetch_add(1, std::memory_order_relaxed);  // a number by itself
 }
 

@@ -23,6 +23,9 @@ class Node;
 
 namespace gimnet::gimi {
 
+/// The fate of a message that was not sent within the time of its call.
+enum class AtTimeout : std::uint8_t { give_up, try_again };
+
 [[nodiscard]] Status status_of(nif_status status);
 /// The last answer of NIF in this thread, as a Failure; `doing` as in "send to 7.17".
 [[nodiscard]] Failure failure_of(nif_status status, std::string_view doing);
@@ -96,8 +99,9 @@ class Uplink {
 
   /// The node's name, or its id, for people.
   [[nodiscard]] std::string node_name() const;
-  /// A message was not sent, and the status says why: counted if the hub was away.
-  void note_unsent(nif_status why) const;
+  /// A message was not sent, and the status says why: counted if the hub was away, apart from a
+  /// timeout after which the program may try again.
+  void note_unsent(nif_status why, AtTimeout at_timeout) const;
   /// Messages that were not sent while the hub was away, since this was asked last.
   [[nodiscard]] std::uint64_t take_unsent() const;
 
