@@ -274,7 +274,7 @@ class Node(Waitable):
                          timeout_ms=to_ms(timeout))
         return Source(self, self._opened(_c.lib.gimi_accept, to_text(name), options), kept=True)
 
-    def send(self, to: Union[str, Peer], value: Any, timeout: float = 1.0, *, lane: str = "normal",
+    def send(self, to: Union[str, Peer], value: Any, timeout: Optional[float] = 1.0, *, lane: str = "normal",
              confirm: bool = False, wait_if_away: bool = False) -> None:
         """Sends to the service of that full name, or to a Peer of find(). `lane`: as of advertise(), and
         the same each time. It does not tell if the message is lost on its way. With `confirm` it waits until the
@@ -287,7 +287,7 @@ class Node(Waitable):
             status = in_pieces(timeout, lambda ms: _c.lib.gimi_try_send(sender, data, size, ms, 0),
                                lambda ms: _c.lib.gimi_send(sender, data, size, ms, 0))
             return self.check(status)
-        ms = to_ms(timeout) if confirm else left_ms(end_of(timeout), TIMEOUT_MS_MAX)
+        ms = left_ms(end_of(timeout), TIMEOUT_MS_MAX)
 
         def call(_: Any = keeps) -> None:
             """In one piece: a second call would send the message a second time. A large one that had begun when
@@ -297,13 +297,13 @@ class Node(Waitable):
 
         interruptible(call)
 
-    def _sender(self, to: Union[str, Peer], lane: str, wait_if_away: bool, timeout: float) -> int:
+    def _sender(self, to: Union[str, Peer], lane: str, wait_if_away: bool, timeout: Optional[float]) -> int:
         sender = self._senders.get((to, lane, wait_if_away))
         if sender is None:
-            options = sized(_c.gimi_send_options, lane=messages.chosen("lane", messages.LANES, lane),
-                            wait_if_away=wait_if_away)
+            options = sized(_c.gimi_send_options, lane=messages.chosen("lane", messages.LANES, lane), wait_if_away=wait_if_away)
             made = (self._opened_at_once(_c.lib.gimi_sender, _peer(to), options) if isinstance(to, Peer) else
-                    self._opened(_c.lib.gimi_sender_to_service, to_text(to), options, to_ms(timeout)))
+                    self._opened(_c.lib.gimi_sender_to_service, to_text(to), options,
+                                 max(1, left_ms(end_of(timeout), TIMEOUT_MS_MAX))))
             sender = self._senders.setdefault((to, lane, wait_if_away), made)
             if sender != made:  # another thread was faster
                 _c.lib.gimi_close(made)

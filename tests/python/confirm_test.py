@@ -74,6 +74,14 @@ class Confirmed(TwoNodes):
             with self.assertRaises(wrong):
                 self.viewer.send(self.robot.id, "x", timeout, confirm=True)
 
+    def test_waits_without_a_limit(self):
+        drive = self.robot.accept("drive")
+        self.viewer.send("robot/drive", "first", None, confirm=True)
+        self.assertEqual(drive.receive(0).text, "first")
+        stop = self.robot.accept("stop")
+        self.viewer.send("robot/stop", "second", None)
+        self.assertEqual(stop.receive(PATIENCE_S).text, "second")
+
 
 class OneReceiver(OneHub):
     """The receiver is another process."""

@@ -54,6 +54,8 @@ class HubAway(TwoNodes):
         for _ in range(3):
             with self.assertRaises(gimnet.Timeout):
                 self.sender.send("robot/drive", "second", 0)
+            with self.assertRaises(gimnet.Timeout):
+                self.sender.send("robot/drive", "third", 0, confirm=True)
         self.assertEqual(self.words_after_the_break(), GOES_ON)
 
     def test_each_message_that_was_not_published_is_counted(self):
