@@ -12,19 +12,6 @@
 
 namespace gimnet::hub {
 
-// jemalloc's door to its statistics (jemalloc(3), "mallctl"). Weak: null in a program without
-// jemalloc.
-extern "C" __attribute__((weak)) int mallctl(const char* name, void* old_value,
-                                             std::size_t* old_size, void* new_value,
-                                             std::size_t new_size);
-
-AllocationMeter::AllocationMeter() {
-  if (mallctl == nullptr) return;
-  std::size_t size = sizeof allocated_;
-  if (mallctl("thread.allocatedp", static_cast<void*>(&allocated_), &size, nullptr, 0) != 0)
-    allocated_ = nullptr;
-}
-
 namespace {
 
 constexpr std::int64_t kNsPerMs = 1'000'000;

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <thread>
 
+#include "hub/shard/allocator.hpp"
 #include "hub/shard/attacher.hpp"
 #include "hub/shard/closer.hpp"
 #include "hub/shard/connection_reader.hpp"
@@ -11,20 +12,6 @@
 #include "hub/shard/shard_state.hpp"
 
 namespace gimnet::hub {
-
-/// Bytes that the calling thread has allocated since it began, as jemalloc counts them. It shows
-/// that a shard's turn allocates nothing, and costs one read to ask. Thread safety: one thread,
-/// which also made it.
-class AllocationMeter {
- public:
-  AllocationMeter();
-
-  /// Never falls. 0 in a program whose allocator is not jemalloc.
-  [[nodiscard]] std::uint64_t bytes() const { return allocated_ != nullptr ? *allocated_ : 0; }
-
- private:
-  const std::uint64_t* allocated_ = nullptr;  ///< jemalloc's own count
-};
 
 /// One io thread: its connections, their queues, and the turn that serves them. A turn takes
 /// commands and mail, reads every ready connection up to its share, routes all of it, then writes

@@ -17,6 +17,8 @@ class Keeper {
 
   /// Between two looks at all connections.
   static constexpr std::uint64_t kTickMs = 100;
+  /// While memory is scarce, freed pages go back to the kernel so often.
+  static constexpr std::uint64_t kReturnPagesMs = 10;
   /// Twice within the time for which a sender heeds PAUSE of another hub.
   static constexpr std::uint64_t kSayAgainMs = 500;
 
@@ -55,6 +57,7 @@ class Keeper {
   Closer& closer_;
   Flusher& flusher_;
   ConnectionReader& reader_;
+  std::uint64_t return_pages_at_ms_ = 0;
   std::uint64_t next_tick_at_ms_ = 0;
   std::uint64_t say_again_at_ms_ = 0;
   std::uint64_t drain_deadline_ms_ = 0;

@@ -1,9 +1,14 @@
-#include "hub/shard/io_shard.hpp"
+#include "hub/shard/allocator.hpp"
 
 #include <gtest/gtest.h>
 
+#include <unistd.h>
+
 #include <cstdlib>
+#include <cstring>
+#include <fstream>
 #include <thread>
+#include <vector>
 
 namespace gimnet::hub {
 namespace {
@@ -38,6 +43,29 @@ TEST(AllocationMeter, DoesNotCountOtherThreads) {
   other.join();
   EXPECT_GE(theirs, 1u << 20);
   EXPECT_LT(meter.bytes() - before, 1u << 20);
+}
+
+std::size_t resident_bytes() {
+  std::ifstream file("/proc/self/statm");
+  std::size_t all = 0;
+  std::size_t resident = 0;
+  file >> all >> resident;
+  return resident * static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
+}
+
+TEST(ReturnFreedPages, GivesBackWhatItsThreadHasFreed) {
+  constexpr std::size_t kBlockBytes = 64 * 1024;
+  constexpr std::size_t kBlocks = 512;
+  std::vector<void*> blocks(kBlocks);
+  for (void*& block : blocks) {
+    block = std::malloc(kBlockBytes);
+    ASSERT_NE(block, nullptr);
+    std::memset(block, 1, kBlockBytes);
+  }
+  for (void* block : blocks) std::free(block);
+  const std::size_t before = resident_bytes();
+  return_freed_pages();
+  EXPECT_LT(resident_bytes() + kBlocks * kBlockBytes / 2, before);
 }
 
 }  // namespace
