@@ -96,12 +96,12 @@ TEST_F(OutboxLink, ItsBudgetRefusesOneByteMoreToLinksAlone) {
 }
 
 TEST_F(OutboxLink, ScarceMemoryOfLinksIsNotThatOfNodes) {
-  rig.link_lease.take(3 << 20);
+  rig.link_lease.take(7 << 19);
   rig.link_lease.begin_turn(0);
   rig.lease.begin_turn(0);
   EXPECT_TRUE(link.outbox.over_share(1 << 20, rig.context));
   EXPECT_FALSE(node.outbox.over_share(1 << 20, rig.context));
-  rig.link_lease.give_back(3 << 20);
+  rig.link_lease.give_back(7 << 19);
 }
 
 // The buffer would count against one budget while the other one's frame alone keeps it.

@@ -252,7 +252,7 @@ TEST_F(PacerTest, WhileMemoryIsScarceHoldsWithinTheShare) {
   offer(one, {"open"});
   EXPECT_THAT(sent(), ElementsAre("open"));
   BudgetLease& lease = rig.egress.lease;
-  lease.take(rig.egress.limits.budget_bytes * 3 / 4);
+  lease.take(rig.egress.limits.budget_bytes * 7 / 8);
   lease.begin_turn(0);
   const std::uint64_t share = lease.share_bytes();
   const Outbox& outbox = recipient.outbox;
@@ -271,7 +271,7 @@ TEST_F(PacerTest, WhileMemoryIsScarceHoldsWithinTheShare) {
   offer_fragment(one, 7, half, 4 * half, std::string(half, 'x'));
   EXPECT_EQ(dropped(DropReason::over_budget), 5u) << "the part that came";
   EXPECT_EQ(outbox.held_bytes(), 0u);
-  lease.give_back(rig.egress.limits.budget_bytes * 3 / 4);
+  lease.give_back(rig.egress.limits.budget_bytes * 7 / 8);
 }
 
 TEST_F(PacerTest, OfALongRunOnlyWhatStaysIsCopied) {
