@@ -35,7 +35,7 @@ class HubLink {
   /// After a break a link has so long to come back, and four times its lowest round trip.
   static constexpr std::chrono::milliseconds kResumeTime{300};
   /// A hub that met its own copy, or itself, tries again so often.
-  static constexpr std::chrono::milliseconds kCopyPause = std::chrono::seconds(10);
+  static constexpr std::chrono::milliseconds kCopyPause = std::chrono::seconds(5);
   /// More breaks than this within kBreaksWithin damp the link. A connection that is resumed within
   /// its time to come back is no break: it cost nobody a route.
   static constexpr std::size_t kBreaksMost = 2;
