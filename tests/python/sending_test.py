@@ -64,6 +64,18 @@ class HubAway(TwoNodes):
         self.assertEqual([pose.publish("x 1") for _ in range(54)], [False] * 54)
         self.assertEqual(self.words_after_the_break(), GOES_ON + "; 54 messages were not sent meanwhile")
 
+    def test_a_subscriber_misses_nothing_that_was_not_published(self):
+        pose = self.sender.advertise("pose")
+        poses = self.robot.subscribe("sender/pose")
+        pose.wait_for_subscribers(1, PATIENCE_S)
+        pose.publish("first")
+        self.break_for(2 * PATIENCE_S)
+        self.assertEqual([pose.publish("x 1") for _ in range(54)], [False] * 54)
+        self.words_after_the_break()
+        pose.publish("second")
+        self.assertEqual([poses.receive(PATIENCE_S).text for _ in range(2)], ["first", "second"])
+        self.assertEqual(poses.missed, 0)
+
 
 if __name__ == "__main__":
     unittest.main()

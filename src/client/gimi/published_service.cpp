@@ -55,6 +55,7 @@ Outcome<void> PublishedService::publish(BytesView data, Timeout timeout, More mo
   sending_ = false;
   changed_.notify_all();
   if (sent) ++published_;
+  if (!sent) --sequence_;  // subscribers would count it as missed, and it may be published again
   if (status == NIF_NOT_CONNECTED) ++unsent_;
   if (status == NIF_OK) return {};
   if (sent) not_retained_ = failure;
