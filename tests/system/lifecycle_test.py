@@ -200,6 +200,19 @@ class Killed(unittest.TestCase):
         numbers = [int(line) for line in reader.out.split()]
         self.assertEqual(numbers, sorted(set(numbers)))
 
+    def test_a_publisher_whose_hub_is_back_ends_well(self):
+        hub = Hub(self)
+        reader = start_gimnet(self, hub, "echo", "robot/odom", "--raw")
+        pub = start_gimnet(self, hub, "pub", "robot/odom", "--rate", "500", "--wait", "1", stdin=subprocess.PIPE)
+        pub.feed(b"".join(b"%d\n" % number for number in range(1, 1000)))
+        wait_until(lambda: len(reader.out) > 100, f"lines; pub said: {pub.err}")
+        hub.process.signal(signal.SIGKILL)
+        hub.process.wait()
+        hub.again(self)
+        self.assertEqual(pub.wait(), 0, pub.err)
+        self.assertNotIn("is the hub running there?", pub.err.splitlines()[-1])
+        wait_until(lambda: reader.out.endswith(b"\n999\n"), f"the last line; it said: {reader.err}")
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -173,6 +173,14 @@ Outcome<void> wait_for_subscribers(const ToolSession& session, const Publisher& 
   }
 }
 
+/// Waits until the last lines have left. What a break cost that is over is no failure of this one.
+Outcome<void> drain(ToolSession& session) {
+  auto drained = session.node().drain(kDrain);
+  if (!drained.is(Status::not_connected) || !session.node().state().connected) return drained;
+  say(drained.failure().sentence);
+  return session.node().drain(kDrain);
+}
+
 /// Says what the hub knows now of messages that subscribers missed. Their libraries tell it once a
 /// second, for which nobody waits.
 void tell_missed(ToolSession& session) {
@@ -230,7 +238,7 @@ ExitCode run_pub(ToolSession& session) {
   Retaining retaining;
   if (sent && !session.stopped())
     sent = publish_lines(session, *publisher, standing, unheard, retaining);
-  if (sent && !session.stopped()) sent = session.node().drain(kDrain);
+  if (sent && !session.stopped()) sent = drain(session);
   retaining.look_at(publisher->retained());
   // A retained line is for those that come later.
   const std::string unheard_words = unheard.sentence(options.target, options.subscribers > 0);
