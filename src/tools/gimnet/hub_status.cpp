@@ -148,6 +148,9 @@ std::string text_of(const std::vector<ConnectionRecord>& connections, Paint pain
 
 namespace {
 
+/// So many nodes and links with full queues are named: those that lost most.
+constexpr std::size_t kFullNamed = 10;
+
 /// The nodes and links whose full queues cost frames, those that lost most first.
 std::string full_queues(const HubStatus& status, std::uint64_t all) {
   std::vector<std::pair<std::uint64_t, std::string>> full;
@@ -161,9 +164,19 @@ std::string full_queues(const HubStatus& status, std::uint64_t all) {
   if (full.empty()) return "";  // all have left, or the hub is older
   std::ranges::stable_sort(full, std::greater{}, [](const auto& each) { return each.first; });
   std::string text;
-  for (const auto& [frames, who] : full) {
-    text += "    for " + printable(who) + ": " + std::to_string(frames) + "\n";
+  std::uint64_t of_others = 0;
+  for (std::size_t i = 0; i < full.size(); ++i) {
+    const auto& [frames, who] = full[i];
     all -= std::min(all, frames);
+    if (i < kFullNamed) {
+      text += "    for " + printable(who) + ": " + std::to_string(frames) + "\n";
+    } else {
+      of_others += frames;
+    }
+  }
+  if (full.size() > kFullNamed) {
+    text += "    for " + std::to_string(full.size() - kFullNamed) +
+            " others (--json names them): " + std::to_string(of_others) + "\n";
   }
   return all == 0 ? text : text + "    for others that have left: " + std::to_string(all) + "\n";
 }

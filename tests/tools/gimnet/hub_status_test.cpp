@@ -97,5 +97,18 @@ TEST(HubStatus, NamesWhoseQueuesWereFull) {
   EXPECT_NE(json_of(full).find(R"("links":[{"name":"lab")"), std::string::npos);
 }
 
+TEST(HubStatus, NamesTenOfManyWhoseQueuesWereFull) {
+  HubStatus full = status();
+  full.shards[1].counters.emplace_back("dropped.queue_full", 1'000);
+  full.connections.assign(12, full.connections[0]);
+  for (std::size_t i = 0; i < 12; ++i) full.connections[i].queue_full = i + 1;
+  const std::string text = text_of(full);
+  EXPECT_NE(text.find("    for node 7.1 robot: 3\n"
+                      "    for 2 others (--json names them): 3\n"
+                      "    for others that have left: 922\n"),
+            std::string::npos)
+      << text;
+}
+
 }  // namespace
 }  // namespace gimnet::tool
