@@ -18,10 +18,11 @@ double pictures_on_wan(const LabsRecord& record) {
   return bytes > 0.0 ? static_cast<double>(record.wan_bytes) / bytes : 0.0;
 }
 
-/// Frames that had no way, or were on one that broke.
+/// Frames that had no way, or were on one that broke, or came behind a cut before the subscribers
+/// had found the service again.
 bool explained_by_cuts(std::string_view reason) {
-  constexpr std::array<std::string_view, 4> kReasons{"link_lost", "link_unsure", "no_route",
-                                                     "away"};
+  constexpr std::array<std::string_view, 5> kReasons{"link_lost", "link_unsure", "no_route", "away",
+                                                     "no_subscriber"};
   return std::ranges::find(kReasons, reason) != kReasons.end();
 }
 

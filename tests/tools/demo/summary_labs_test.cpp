@@ -71,18 +71,19 @@ TEST(LabsSummary, SaysWhatTheCutsExplain) {
   LabsRecord record = good();
   record.machines[0].run.commands = 4;
   record.machines[0].run.commands_excused = 3;
-  record.hubs[0].counters.drops = {
-      {"no_route", 3}, {"link_lost", 1}, {"link_unsure", 1}, {"away", 1}, {"replaced", 5}};
-  record.hubs[0].counters.accepted = 11;
+  record.hubs[0].counters.drops = {{"no_route", 3}, {"link_lost", 1},     {"link_unsure", 1},
+                                   {"away", 1},     {"no_subscriber", 2}, {"replaced", 5}};
+  record.hubs[0].counters.accepted = 13;
   record.seen = {seen(90, 10, 10), seen(100)};
   EXPECT_THAT(complaints_about(record), IsEmpty());
   EXPECT_THAT(summary_text(record), HasSubstr("As it should be: 13 messages were lost"));
   expect_narrow(summary_text(record));
   record.cuts = 0;
-  EXPECT_THAT(complaints_about(record), ElementsAre("hub north dropped 1 frames: away",
-                                                    "hub north dropped 1 frames: link_lost",
-                                                    "hub north dropped 1 frames: link_unsure",
-                                                    "hub north dropped 3 frames: no_route"));
+  EXPECT_THAT(
+      complaints_about(record),
+      ElementsAre("hub north dropped 1 frames: away", "hub north dropped 1 frames: link_lost",
+                  "hub north dropped 1 frames: link_unsure", "hub north dropped 3 frames: no_route",
+                  "hub north dropped 2 frames: no_subscriber"));
 }
 
 TEST(LabsSummary, NamesWhatTheCutsDoNotExplain) {
