@@ -39,7 +39,7 @@ class HubAccess {
     return detail::listed<gimi_service_record>(status, list);
   }
 
-  /// As ping(), with the way that the answer came.
+  /// Does what ping() does, and tells the way that the answer came.
   Outcome<TracedPing> trace(Peer to, Timeout timeout = Timeout{1000},
                             Lane lane = Lane::normal) const {
     TracedPing traced;

@@ -33,7 +33,7 @@ class AcceptedService {
 
   /// Without the node's.
   [[nodiscard]] const std::string& name() const { return name_; }
-  /// As it is now; without the node's name while the node has none.
+  /// The present full name; without the node's name while the node has none.
   [[nodiscard]] OwnedServiceName full_name() GIMNET_EXCLUDES(mutex_);
   /// Does the hub have it? Errors: why it did not take it again; closed.
   [[nodiscard]] Outcome<void> standing() GIMNET_EXCLUDES(mutex_);

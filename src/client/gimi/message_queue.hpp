@@ -48,7 +48,7 @@ class MessageQueue {
   /// One that grows may take so many bytes, as cost_bytes() counts them.
   void allow(std::size_t cost_bytes_max);
   /// Memory that its messages keep: a place and their bytes each, and the slabs that they lie in.
-  /// Those that lie in one slab behind each other share it.
+  /// Messages behind each other in one slab share it.
   [[nodiscard]] std::size_t cost_bytes() const { return cost_bytes_; }
 
   /// It would refuse. A message fits into an empty queue, whatever its size. A paced one holds the

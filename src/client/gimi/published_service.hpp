@@ -30,7 +30,7 @@ class PublishedService {
         full_name_(std::move(full_name)) {}
 
   [[nodiscard]] const std::string& name() const { return name_; }
-  /// As it is now; without the node's name while the node has none.
+  /// The present full name; without the node's name while the node has none.
   [[nodiscard]] std::string full_name() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] Outcome<void> publish(BytesView data, Timeout timeout, More more)
       GIMNET_EXCLUDES(mutex_);
@@ -50,7 +50,7 @@ class PublishedService {
   /// 0: the hub refuses it at the moment.
   [[nodiscard]] std::uint32_t group() GIMNET_EXCLUDES(mutex_);
   void on_group(std::uint32_t group) GIMNET_EXCLUDES(mutex_);
-  /// Why that is so: the hub's words.
+  /// The hub refused the service; `refusal` has its words.
   void on_refused(Failure refusal) GIMNET_EXCLUDES(mutex_);
   void on_subscribers(std::size_t count) GIMNET_EXCLUDES(mutex_);
   /// The hub does not keep a message; `sent`: its header, if that is known.

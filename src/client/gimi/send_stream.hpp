@@ -91,7 +91,8 @@ class SendStream {
       GIMNET_EXCLUDES(mutex_);
   /// One message is known to be lost.
   void on_lost(std::uint32_t sequence, const Loss& why) GIMNET_EXCLUDES(mutex_);
-  /// As on_lost(); the receiver does not take it. Its send() answers so if it still goes on.
+  /// The receiver does not take the message. Counts it as on_lost() does; a send() that still
+  /// goes on answers with `why`.
   void on_refused(std::uint32_t sequence, const Loss& why) GIMNET_EXCLUDES(mutex_);
   /// Messages may be lost, and that is why: ask.
   void on_doubt(const Loss& why) GIMNET_EXCLUDES(mutex_);
@@ -150,7 +151,7 @@ class SendStream {
   [[nodiscard]] Outcome<Turn> take_turn(BytesView data, const Order& order) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] Outcome<void> await(const Confirmation& confirmation, std::int64_t deadline_ns)
       GIMNET_REQUIRES(mutex_);
-  /// Why nothing is sent to a service that nobody has, or that is away.
+  /// The refusal to send to a service that nobody has, or that is away.
   [[nodiscard]] Failure nobody_there() const GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status transmit(const Destination& to, const proto::gimi::MessageHeader& header,
                                     BytesView data, More more, std::int32_t timeout_ms) const;

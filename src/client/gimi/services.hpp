@@ -156,7 +156,7 @@ class SubscribedService {
   [[nodiscard]] Share widest_share() const GIMNET_REQUIRES(mutex_);
   /// The queues of those that want a lower rate than the hub may send keep it themselves.
   void pace_queues() GIMNET_REQUIRES(mutex_);
-  /// Of one subscriber, as missed_in_all().
+  /// The part of missed_in_all() that one subscriber missed.
   [[nodiscard]] std::uint64_t missed_by(const Subscriber& subscriber) GIMNET_REQUIRES(mutex_);
   /// One of its messages is about to be put into queues: whoever takes it knows what is missing
   /// before it.

@@ -50,7 +50,7 @@ class Node final : private InboundHost {
   }
   [[nodiscard]] nif_info info();
   [[nodiscard]] nif_counters counters();
-  /// As nif_send(). `tag`: for Outbound::give_up().
+  /// Sends as nif_send() does. `tag` names the message to Outbound::give_up().
   [[nodiscard]] nif_status send(const nif_outgoing& message, std::int32_t timeout_ms,
                                 std::uint64_t tag = 0);
   [[nodiscard]] nif_status ping_hub(HubClock::Measurement& measured, Deadline deadline);

@@ -144,7 +144,7 @@ class Topics {
   /// that subscribed to it are told, and get its messages. `away`: if it gives data.
   void note_moved(std::string_view full_name, const std::optional<AwayService>& away,
                   std::chrono::milliseconds now, Effects& effects);
-  /// So many subscribers at other hubs has that group of this hub.
+  /// Notes the number of subscribers at other hubs of a group of this hub.
   void set_afar(GroupIndex group, std::uint32_t subscribers, Effects& effects);
 
   /// Grows with each ServiceChanged.
